@@ -1,0 +1,1 @@
+"""What a problem, a plan and an answer are; no algorithm, no web."""

@@ -1,0 +1,1 @@
+"""The one simulator: problems as arrays, compiled replay and episodes, generated problems."""

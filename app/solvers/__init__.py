@@ -1,0 +1,1 @@
+"""Algorithms that turn a problem into a plan, behind one protocol."""

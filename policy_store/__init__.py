@@ -1,0 +1,1 @@
+"""The policy library: source tasks, their checkpoints and the search for similar ones."""
