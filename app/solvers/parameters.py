@@ -1,0 +1,22 @@
+"""Parameters of the algorithms in this room, by the paper's names."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from app.solvers.protocol import Parameters
+
+
+class GreedyParameters(Parameters):
+    """The greedy rule has nothing to set."""
+
+
+class GeneticParameters(Parameters):
+    """Table 2 of the paper; its ``max_step`` is the problem's ``max_steps``, its ``seed`` the request's."""
+
+    num_total: int = Field(default=30, ge=2, le=10_000, description="Population size (Table 2)")
+    iteration: int = Field(default=200, ge=0, le=1_000_000, description="Generations (Table 2)")
+    crossover_rate: float = Field(
+        default=0.8, ge=0, le=1, description="Probability that two parents are crossed"
+    )
+    mutation_rate: float = Field(default=0.05, ge=0, le=1, description="Probability that a gene is redrawn")

@@ -1,0 +1,148 @@
+"""What every algorithm is: one small protocol, and the words it speaks.
+
+A solver is built from its parameters and a context, then solves problems. It is found by name in
+:mod:`app.solvers.registry`; the service, the command line, the dashboard and the benchmarks know no other way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+
+
+class Parameters(BaseModel):
+    """Base of every algorithm's parameters: frozen, strict, nothing unknown, every field described."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SolverContext:
+    """What a solver may use besides the problem.
+
+    Attributes
+    ----------
+    library_url
+        Database of the policy library, or None where there is none.
+    """
+
+    library_url: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a solver is.
+
+    Attributes
+    ----------
+    fraction
+        Of the work, 0 to 1.
+    epoch
+        Generations, training epochs or rounds done.
+    best_reward
+        True reward of the incumbent.
+    incumbent
+        The best plan so far.
+    """
+
+    fraction: float
+    epoch: int
+    best_reward: float
+    incumbent: Plan
+
+
+Report = Callable[[Progress], None]
+
+
+class StopCriterion(Protocol):
+    """Says when to end early. Asking does not change it, and costs little enough to ask every epoch."""
+
+    def __call__(self) -> bool:
+        """Return True once the solver should return its incumbent."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Reward against epoch, as in the paper's figures; two lists of one length."""
+
+    epoch: list[int] = field(default_factory=list)
+    reward: list[float] = field(default_factory=list)
+
+    def add(self, epoch: int, reward: float) -> None:
+        """Append one evaluation."""
+        self.epoch.append(epoch)
+        self.reward.append(reward)
+
+
+@dataclass(frozen=True, slots=True)
+class SourcePolicy:
+    """The library's policy that was transferred, and its distance to the problem."""
+
+    id: str
+    name: str
+    distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What a solver found.
+
+    Attributes
+    ----------
+    plan
+        The incumbent; legal, and never absent: where nothing can be flown it sends everybody home.
+    history
+        Reward against epoch.
+    parameters
+        The parameters as they were used, defaults filled in.
+    source_policy
+        The transferred policy, if any.
+    checkpoint
+        What was learned, as a checkpoint of :mod:`app.learning.checkpoint`, or None.
+    """
+
+    plan: Plan
+    history: History
+    parameters: Parameters
+    source_policy: SourcePolicy | None = None
+    checkpoint: bytes | None = None
+
+
+class Solver(Protocol):
+    """An algorithm. ``__init__(parameters, context)`` builds it; one object may solve many problems."""
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """Find a plan.
+
+        Parameters
+        ----------
+        problem
+            The problem.
+        seed
+            Source of all randomness: the same problem, seed and parameters give the same solution as long
+            as `stop` does not end it early.
+        stop
+            Asked at least every few milliseconds of work, where the algorithm allows.
+        report
+            Told about progress; may be called often.
+
+        Returns
+        -------
+        Solution
+            The best plan found by its true reward, also when `stop` was true from the beginning.
+
+        Raises
+        ------
+        ProblemTooLarge
+            If the algorithm cannot hold the problem.
+        NoCompatibleSource
+            If it transfers and the library has nothing to transfer.
+        """
+        ...

@@ -1,0 +1,140 @@
+"""The algorithms by name: one line each, and everything else finds them here.
+
+Implementations are named, not imported: listing the algorithms and checking their parameters loads neither
+torch nor compiled code, so the web process can do it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
+from app.solvers.protocol import Parameters, Solver, SolverContext
+
+
+@dataclass(frozen=True, slots=True)
+class Algorithm:
+    """One line of the registry.
+
+    Attributes
+    ----------
+    name
+        As in ``POST /allocate``.
+    summary
+        One sentence for a person who chooses.
+    solver
+        ``"module:Class"`` of the :class:`~app.solvers.protocol.Solver`.
+    parameters
+        ``"module:Class"`` of its :class:`~app.solvers.protocol.Parameters`, in a module without torch.
+    learns
+        Whether its solutions carry a checkpoint that the library can hold.
+    """
+
+    name: str
+    summary: str
+    solver: str
+    parameters: str
+    learns: bool = False
+
+    def parameter_model(self) -> type[Parameters]:
+        """Return the class of its parameters."""
+        return cast(type[Parameters], _resolve(self.parameters))
+
+
+ALGORITHMS: Mapping[str, Algorithm] = {
+    algorithm.name: algorithm
+    for algorithm in (
+        Algorithm(
+            "transfer_qmix",
+            "Copies the most similar source policy of the library and fine-tunes it (Algorithm 2)",
+            "app.learning.transfer:TransferQmix",
+            "app.learning.parameters:TransferQmixParameters",
+            learns=True,
+        ),
+        Algorithm(
+            "qmix",
+            "Multi-agent Q-learning with a monotonic mixing network, from scratch (Algorithm 1)",
+            "app.learning.qmix:Qmix",
+            "app.learning.parameters:QmixParameters",
+            learns=True,
+        ),
+        Algorithm(
+            "dqn",
+            "Q-learning over the joint action space (Eq. 15); small problems only, to compare with",
+            "app.learning.dqn:Dqn",
+            "app.learning.parameters:DqnParameters",
+        ),
+        Algorithm(
+            "ga",
+            "The paper's genetic algorithm (Table 2)",
+            "app.solvers.genetic:GeneticAlgorithm",
+            "app.solvers.parameters:GeneticParameters",
+        ),
+        Algorithm(
+            "greedy",
+            "Every UAV in turn takes the visit that earns most at once; the yardstick",
+            "app.solvers.greedy:Greedy",
+            "app.solvers.parameters:GreedyParameters",
+        ),
+    )
+}
+
+
+def algorithm(name: str) -> Algorithm:
+    """Find an algorithm.
+
+    Raises
+    ------
+    UnknownAlgorithm
+        If there is none of that name.
+    """
+    found = ALGORITHMS.get(name)
+    if found is None:
+        names = list(ALGORITHMS)
+        detail = f"no algorithm is called {name!r}; there are {', '.join(names)}"
+        raise UnknownAlgorithm(detail, [Violation("/algorithm", detail)], {"algorithms": names})
+    return found
+
+
+def parse_parameters(name: str, given: Mapping[str, Any]) -> Parameters:
+    """Check an algorithm's parameters and fill in the defaults.
+
+    Raises
+    ------
+    UnknownAlgorithm
+        If there is no such algorithm.
+    InvalidParameters
+        If a parameter is unknown or out of range; violations point into ``/parameters``.
+    """
+    try:
+        return algorithm(name).parameter_model().model_validate(dict(given))
+    except ValidationError as error:
+        violations = [
+            Violation("/".join(("/parameters", *map(str, e["loc"]))), e["msg"])
+            for e in error.errors(include_url=False, include_context=False, include_input=False)
+        ]
+        raise InvalidParameters(
+            f"parameters of {name}: {violations[0].pointer}: {violations[0].detail}", violations
+        ) from None
+
+
+def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
+    """Load an algorithm's implementation and build it.
+
+    Raises
+    ------
+    UnknownAlgorithm
+        If there is no such algorithm.
+    """
+    solver = _resolve(algorithm(name).solver)
+    return cast(Solver, solver(parameters, context))
+
+
+def _resolve(dotted: str) -> Any:
+    module, _, name = dotted.partition(":")
+    return getattr(import_module(module), name)
