@@ -1,7 +1,7 @@
 """What every algorithm is: one small protocol, and the words it speaks.
 
 A solver is built from its parameters and a context, then solves problems. It is found by name in
-:mod:`app.solvers.registry`; the service, the command line, the dashboard and the benchmarks know no other way.
+:mod:`app.solvers.registry`; service, command line, dashboard and benchmarks know no other way.
 """
 
 from __future__ import annotations
