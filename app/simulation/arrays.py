@@ -1,0 +1,142 @@
+"""Problems as arrays: the one conversion from the domain to what compiled code reads.
+
+Every array has a leading axis of P problems, so that episodes of different problems can advance in lock-step.
+Problems of different sizes are stacked by padding: a padded UAV is a returning one, a padded target needs
+nothing, so neither is ever part of an allowed visit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from app.domain.geometry import distances
+from app.domain.problem import Problem
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
+
+
+class ProblemArrays(NamedTuple):
+    """A stack of P problems of one (padded) shape M, N, K.
+
+    Attributes
+    ----------
+    start_target
+        (P, M, N) distance from a UAV's current position in the request to a target.
+    between
+        (P, N, N) distance between targets.
+    home
+        (P, M, N) distance from a target to a UAV's starting point.
+    start_home
+        (P, M) distance from a UAV's current position in the request to its starting point.
+    speed, voyage, dis
+        (P, M) as in the request.
+    ret
+        (P, M) UAVs that are returning.
+    load
+        (P, M, K) amounts carried.
+    need
+        (P, N, K) amounts needed.
+    need_total
+        (P, N) sum of the needs over materials.
+    level, deadline, service
+        (P, N); deadline is infinite where there is none.
+    weight
+        (P,) distance weight λ as it is used.
+    return_to_base, charge_return
+        (P,) the objective's switches.
+    max_steps
+        (P,) S.
+    """
+
+    start_target: Floats
+    between: Floats
+    home: Floats
+    start_home: Floats
+    speed: Floats
+    voyage: Floats
+    dis: Floats
+    ret: Flags
+    load: Floats
+    need: Floats
+    need_total: Floats
+    level: Floats
+    deadline: Floats
+    service: Floats
+    weight: Floats
+    return_to_base: Flags
+    charge_return: Flags
+    max_steps: Integers
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """M, N and K of the stack, padding included."""
+        _, m, k = self.load.shape
+        return m, self.need.shape[1], k
+
+
+def compile_problem(problem: Problem) -> ProblemArrays:
+    """Turn one problem into a stack of one."""
+    uavs, targets = problem.uavs, problem.targets
+    start = np.array([(u.x_s, u.y_s) for u in uavs], dtype=np.float64)
+    current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
+    area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
+    need = np.array([t.loadlist for t in targets], dtype=np.float64)
+    start_home = np.array(
+        [distances(problem.crs, current[i : i + 1], start[i : i + 1])[0, 0] for i in range(len(uavs))]
+    )
+    return ProblemArrays(
+        start_target=distances(problem.crs, current, area)[None],
+        between=distances(problem.crs, area, area)[None],
+        home=distances(problem.crs, start, area)[None],
+        start_home=start_home[None],
+        speed=np.array([[u.speed for u in uavs]], dtype=np.float64),
+        voyage=np.array([[u.voyage for u in uavs]], dtype=np.float64),
+        dis=np.array([[u.dis for u in uavs]], dtype=np.float64),
+        ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
+        load=np.array([[u.loadlist for u in uavs]], dtype=np.float64),
+        need=need[None],
+        need_total=need.sum(axis=1)[None],
+        level=np.array([[t.level for t in targets]], dtype=np.float64),
+        deadline=np.array(
+            [[np.inf if t.deadline is None else t.deadline for t in targets]], dtype=np.float64
+        ),
+        service=np.array([[t.service_time for t in targets]], dtype=np.float64),
+        weight=np.array([problem.distance_weight], dtype=np.float64),
+        return_to_base=np.array([problem.objective.return_to_base], dtype=np.bool_),
+        charge_return=np.array([problem.objective.charge_return], dtype=np.bool_),
+        max_steps=np.array([problem.max_steps], dtype=np.int64),
+    )
+
+
+_PADDING = {"speed": 1.0, "ret": True, "deadline": np.inf}
+
+
+def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
+    """Stack problems, padding each to the largest M, N and K among them.
+
+    The action that sends a UAV home is the padded N; actions of padded targets are never allowed.
+
+    Parameters
+    ----------
+    problems
+        At least one.
+    """
+    columns = zip(ProblemArrays._fields, zip(*problems, strict=True), strict=True)
+    return ProblemArrays(**{name: _pad(arrays, _PADDING.get(name, 0)) for name, arrays in columns})
+
+
+def _pad(arrays: Sequence[npt.NDArray[Any]], value: float) -> npt.NDArray[Any]:
+    largest = [max(sizes) for sizes in zip(*(a.shape[1:] for a in arrays), strict=True)]
+    total = sum(len(a) for a in arrays)
+    padded = np.full((total, *largest), value, dtype=arrays[0].dtype)
+    row = 0
+    for a in arrays:
+        padded[(slice(row, row + len(a)), *(slice(size) for size in a.shape[1:]))] = a
+        row += len(a)
+    return padded

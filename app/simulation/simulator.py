@@ -1,0 +1,332 @@
+"""The simulator: sections 2 to 4 of the specification, compiled, batch-first.
+
+There is one truth about what a plan earns, and it is here: the genetic algorithm, the searches and the
+learners all call these functions. Functions over one UAV's action take ``(arrays, episodes, b, …)``: the
+stack of problems, the batch of episodes, and the episode's index; functions over a batch loop over them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+
+TOLERANCE = 1e-6
+"""Relative tolerance of the comparisons with range and deadline."""
+
+ALLOWED = 0
+RETURNING = 1
+OUT_OF_RANGE = 2
+TOO_LATE = 3
+UNLOADS_NOTHING = 4
+NO_SUCH_ACTION = 5
+TOO_MANY_STEPS = 6
+
+RULES = {
+    RETURNING: "a returning UAV gets no more targets",
+    OUT_OF_RANGE: "the visit, and the way home where it is required, exceed the voyage",
+    TOO_LATE: "it arrives after the deadline",
+    UNLOADS_NOTHING: "it would unload nothing",
+    NO_SUCH_ACTION: "there is no such action",
+    TOO_MANY_STEPS: "the plan has more rows than max_steps",
+}
+"""What :func:`verdict` and :func:`replay` return for an action that is not allowed, in words."""
+
+START = -1
+"""Value of ``Episodes.at`` for a UAV that is still where the request has it."""
+
+
+class Episodes(NamedTuple):
+    """The state of B episodes in lock-step.
+
+    Attributes
+    ----------
+    problem
+        (B,) index into the stack of problems.
+    at
+        (B, M) where each UAV is: ``START``, a target, or N for its starting point.
+    flown, clock
+        (B, M) distance flown and time passed.
+    ret
+        (B, M) UAVs that have been sent home.
+    load
+        (B, M, K) amounts still carried.
+    need
+        (B, N, K) amounts still needed.
+    satisfaction, distance
+        (B,) what the episode has earned, and flown against the reward.
+    step
+        (B,) decision steps closed.
+    done
+        (B,) episodes that are over.
+    """
+
+    problem: Integers
+    at: Integers
+    flown: Floats
+    clock: Floats
+    ret: Flags
+    load: Floats
+    need: Floats
+    satisfaction: Floats
+    distance: Floats
+    step: Integers
+    done: Flags
+
+
+class Replay(NamedTuple):
+    """What B plans earn; where ``rule`` is not 0, the first action that is not allowed.
+
+    Attributes
+    ----------
+    reward, satisfaction, distance
+        (B,) up to the first action that is not allowed.
+    rule, step, uav
+        (B,) the rule it breaks (0 for a legal plan), its step and UAV, counted from 0.
+    """
+
+    reward: Floats
+    satisfaction: Floats
+    distance: Floats
+    rule: Integers
+    step: Integers
+    uav: Integers
+
+
+def new_episodes(arrays: ProblemArrays, batch: int, problem: Integers | None = None) -> Episodes:
+    """Begin `batch` episodes.
+
+    Parameters
+    ----------
+    arrays
+        The stack of problems.
+    batch
+        B.
+    problem
+        (B,) index of each episode's problem; all the first one by default.
+    """
+    m, n, k = arrays.shape
+    episodes = Episodes(
+        problem=np.zeros(batch, np.int64) if problem is None else np.ascontiguousarray(problem, np.int64),
+        at=np.empty((batch, m), np.int64),
+        flown=np.empty((batch, m)),
+        clock=np.empty((batch, m)),
+        ret=np.empty((batch, m), np.bool_),
+        load=np.empty((batch, m, k)),
+        need=np.empty((batch, n, k)),
+        satisfaction=np.empty(batch),
+        distance=np.empty(batch),
+        step=np.empty(batch, np.int64),
+        done=np.empty(batch, np.bool_),
+    )
+    reset(arrays, episodes)
+    return episodes
+
+
+@njit(cache=True)
+def reset(arrays: ProblemArrays, episodes: Episodes) -> None:
+    """Put every episode back to its beginning."""
+    for b in range(episodes.problem.shape[0]):
+        reset_one(arrays, episodes, b)
+
+
+@njit(cache=True)
+def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
+    """Put episode `b` back to its beginning."""
+    p = episodes.problem[b]
+    episodes.at[b] = START
+    episodes.flown[b] = arrays.dis[p]
+    episodes.clock[b] = 0.0
+    episodes.ret[b] = arrays.ret[p]
+    episodes.load[b] = arrays.load[p]
+    episodes.need[b] = arrays.need[p]
+    episodes.satisfaction[b] = 0.0
+    episodes.distance[b] = 0.0
+    episodes.step[b] = 0
+    episodes.done[b] = not any_allowed(arrays, episodes, b)
+
+
+@njit(cache=True)
+def leg_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
+    """Distance from where UAV `i` is to target `j` (rule 1 of section 3)."""
+    p, at = episodes.problem[b], episodes.at[b, i]
+    if at == START:
+        return arrays.start_target[p, i, j]
+    return arrays.between[p, at, j]
+
+
+@njit(cache=True)
+def leg_home(arrays: ProblemArrays, episodes: Episodes, b: int, i: int) -> float:
+    """Distance from where UAV `i` is to its starting point."""
+    p, at = episodes.problem[b], episodes.at[b, i]
+    if at == START:
+        return arrays.start_home[p, i]
+    if at == arrays.level.shape[1]:
+        return 0.0
+    return arrays.home[p, i, at]
+
+
+@njit(cache=True)
+def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> int:
+    """Rule 2 of section 3: ``ALLOWED``, or the rule that a visit of UAV `i` to target `j` breaks now."""
+    if episodes.ret[b, i]:
+        return RETURNING
+    useful = False
+    for k in range(episodes.load.shape[2]):
+        if episodes.load[b, i, k] > 0.0 and episodes.need[b, j, k] > 0.0:
+            useful = True
+            break
+    if not useful:
+        return UNLOADS_NOTHING
+    p = episodes.problem[b]
+    d = leg_to(arrays, episodes, b, i, j)
+    reach = episodes.flown[b, i] + d
+    if arrays.return_to_base[p]:
+        reach += arrays.home[p, i, j]
+    if reach > arrays.voyage[p, i] * (1.0 + TOLERANCE):
+        return OUT_OF_RANGE
+    deadline = arrays.deadline[p, j]
+    if episodes.clock[b, i] + d / arrays.speed[p, i] > deadline + abs(deadline) * TOLERANCE:
+        return TOO_LATE
+    return ALLOWED
+
+
+@njit(cache=True)
+def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) -> float:
+    """Let UAV `i` take an action that is allowed, and return what it earns (rules 1 and 3 to 5).
+
+    A UAV that has returned stays home and earns nothing.
+    """
+    p, home = episodes.problem[b], arrays.level.shape[1]
+    if action == home:
+        if episodes.ret[b, i]:
+            return 0.0
+        d = leg_home(arrays, episodes, b, i)
+        episodes.ret[b, i] = True
+        episodes.at[b, i] = home
+        episodes.flown[b, i] += d
+        if not arrays.charge_return[p]:
+            return 0.0
+        episodes.distance[b] += d
+        return -arrays.weight[p] * d
+    d = leg_to(arrays, episodes, b, i, action)
+    episodes.clock[b, i] += d / arrays.speed[p, i]
+    episodes.clock[b, i] += arrays.service[p, action]
+    episodes.flown[b, i] += d
+    episodes.at[b, i] = action
+    episodes.distance[b] += d
+    earned = 0.0
+    for k in range(episodes.load.shape[2]):
+        unloaded = min(episodes.load[b, i, k], episodes.need[b, action, k])
+        if unloaded > 0.0:
+            episodes.load[b, i, k] -= unloaded
+            episodes.need[b, action, k] -= unloaded
+            earned += arrays.level[p, action] * unloaded / arrays.need_total[p, action]
+    episodes.satisfaction[b] += earned
+    return earned - arrays.weight[p] * d
+
+
+@njit(cache=True)
+def end_step(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
+    """Close a decision step, and the episode with it when nothing more can be earned.
+
+    An episode is over when all UAVs have returned, no UAV has an allowed visit left, or S steps are closed.
+    Then every UAV that is still out flies home.
+
+    Returns
+    -------
+    float
+        What the legs home at the end cost, 0 or less.
+    """
+    episodes.step[b] += 1
+    p = episodes.problem[b]
+    if episodes.step[b] < arrays.max_steps[p] and any_allowed(arrays, episodes, b):
+        return 0.0
+    episodes.done[b] = True
+    charged = 0.0
+    for i in range(episodes.ret.shape[1]):
+        charged += act(arrays, episodes, b, i, arrays.level.shape[1])
+    return charged
+
+
+@njit(cache=True)
+def any_allowed(arrays: ProblemArrays, episodes: Episodes, b: int) -> bool:
+    """Whether any UAV has an allowed visit now."""
+    for i in range(episodes.ret.shape[1]):
+        for j in range(episodes.need.shape[1]):
+            if verdict(arrays, episodes, b, i, j) == ALLOWED:
+                return True
+    return False
+
+
+@njit(cache=True)
+def allowed_actions(arrays: ProblemArrays, episodes: Episodes, out: Flags) -> None:
+    """Fill the masks of this moment: home is always allowed, a visit as :func:`verdict` says.
+
+    Parameters
+    ----------
+    arrays, episodes
+        As everywhere.
+    out
+        (B, M, N+1), overwritten.
+    """
+    n = episodes.need.shape[1]
+    for b in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            for j in range(n):
+                out[b, i, j] = verdict(arrays, episodes, b, i, j) == ALLOWED
+            out[b, i, n] = True
+
+
+@njit(cache=True)
+def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
+    """Replay B plans and compute their rewards (section 4).
+
+    Parameters
+    ----------
+    arrays
+        The stack of problems.
+    plans
+        (B, S, M) actions.
+    problem
+        (B,) each plan's problem in the stack.
+    """
+    batch, steps, m = plans.shape
+    n, k = arrays.need.shape[1], arrays.need.shape[2]
+    result = Replay(
+        np.zeros(batch), np.zeros(batch), np.zeros(batch),
+        np.zeros(batch, np.int64), np.zeros(batch, np.int64), np.zeros(batch, np.int64),
+    )  # fmt: skip
+    # One episode's worth of state serves the whole batch: it stays in the processor's cache.
+    state = Episodes(
+        np.zeros(1, np.int64), np.empty((1, m), np.int64), np.empty((1, m)), np.empty((1, m)),
+        np.empty((1, m), np.bool_), np.empty((1, m, k)), np.empty((1, n, k)),
+        np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.bool_),
+    )  # fmt: skip
+    for b in range(batch):
+        state.problem[0] = problem[b]
+        reset_one(arrays, state, 0)
+        rule = TOO_MANY_STEPS if steps > arrays.max_steps[problem[b]] else ALLOWED
+        s = 0
+        while rule == ALLOWED and s < steps:
+            for i in range(m):
+                action = plans[b, s, i]
+                if action < 0 or action > n:
+                    rule = NO_SUCH_ACTION
+                elif action < n:
+                    rule = verdict(arrays, state, 0, i, action)
+                if rule != ALLOWED:
+                    result.step[b], result.uav[b] = s, i
+                    break
+                act(arrays, state, 0, i, action)
+            s += 1
+        if rule == ALLOWED:
+            for i in range(m):
+                act(arrays, state, 0, i, n)
+        result.rule[b] = rule
+        result.satisfaction[b], result.distance[b] = state.satisfaction[0], state.distance[0]
+        result.reward[b] = state.satisfaction[0] - arrays.weight[problem[b]] * state.distance[0]
+    return result
