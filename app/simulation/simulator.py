@@ -17,7 +17,8 @@ from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-compiled: Callable[[Function], Function] = njit(cache=True, error_model="numpy", _nrt=False)
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+compiled: Callable[[Function], Function] = njit(**_OPTIONS)
 """Compiles functions that allocate nothing and slice nothing.
 
 Without reference counts (``_nrt=False``, numba's own switch for such code) a call that carries the two dozen

@@ -78,7 +78,7 @@ def _reason(
     ]
     if not able:
         return LOADS_USED, (
-            f"{int(reaching.sum())} UAVs could serve it first; the plan uses their loads, range or time elsewhere"
+            f"{reaching.sum()} UAVs could serve it first; the plan uses their loads, range or time elsewhere"
         )
     gains = {i: _gain(arrays, episodes, i, j) for i in able}
     best = max(able, key=lambda i: gains[i])
