@@ -1,0 +1,117 @@
+"""How SQLite is opened: the one place that knows its dialect.
+
+What the settings are for:
+
+- ``isolation_level=None`` and an explicit BEGIN. The driver's own transactions begin at the first write, so
+  a read before it sees a state that another writer may change: updates are lost without an error.
+  BEGIN IMMEDIATE takes the write lock first.
+- WAL lets readers go on while one writes; synchronous=FULL makes a commit survive a power failure.
+- One writing connection in the process, behind a lock: SQLite before 3.51.3 can damage its WAL when two
+  connections write or checkpoint at the same moment, and a lock in the process is fairer than polling.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy.pool import NullPool, QueuePool
+
+from policy_store.errors import UnsupportedDatabase
+
+_BUSY_TIMEOUT_S = 10.0
+_MIGRATION_BUSY_TIMEOUT_S = 60.0
+_WAL_RETRY_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Engines:
+    """The engines of one database, and the name under which its writers take turns."""
+
+    write: Engine
+    read: Engine
+    migrate: Engine
+    lock_name: str
+
+
+def open_sqlite(url: URL) -> Engines:
+    """Make the engines of an SQLite file; its folder is made where it is missing.
+
+    Raises
+    ------
+    UnsupportedDatabase
+        If the URL names no file: a database in memory would be another one for every connection.
+    """
+    name = url.database
+    if not name or name == ":memory:" or name.startswith("file:"):
+        raise UnsupportedDatabase(str(url), "SQLite needs the path of a file")
+    path = Path(name).resolve()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    resolved = url.set(database=str(path))
+    return Engines(
+        write=_engine(resolved, "BEGIN IMMEDIATE", poolclass=QueuePool, pool_size=1, max_overflow=0),
+        read=_engine(resolved, "BEGIN", query_only=True, poolclass=QueuePool, pool_size=8, max_overflow=32),
+        # Alembic rebuilds a table to change it; with foreign keys on, dropping the old one would delete the
+        # rows that refer to it. The pragma cannot be changed inside a transaction, hence an own engine.
+        migrate=_engine(
+            resolved,
+            "BEGIN IMMEDIATE",
+            foreign_keys=False,
+            busy_timeout_s=_MIGRATION_BUSY_TIMEOUT_S,
+            poolclass=NullPool,
+        ),
+        lock_name=str(path),
+    )
+
+
+def broken_references(connection: Connection) -> list[str]:
+    """List the rows that refer to nothing, which SQLite does not notice while foreign keys are off."""
+    rows = connection.exec_driver_sql("PRAGMA foreign_key_check")
+    return [f"row {row[1]} of {row[0]} refers to a missing row of {row[2]}" for row in rows]
+
+
+def _engine(
+    url: URL,
+    begin: str,
+    *,
+    foreign_keys: bool = True,
+    query_only: bool = False,
+    busy_timeout_s: float = _BUSY_TIMEOUT_S,
+    **options: Any,
+) -> Engine:
+    engine = create_engine(url, connect_args={"timeout": busy_timeout_s}, **options)
+
+    @event.listens_for(engine, "connect")
+    def set_up(connection: sqlite3.Connection, _record: object) -> None:
+        connection.isolation_level = None
+        connection.execute(f"PRAGMA busy_timeout = {round(busy_timeout_s * 1000)}")
+        connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
+        if query_only:
+            connection.execute("PRAGMA query_only = ON")
+        else:
+            _use_wal(connection, busy_timeout_s)
+            connection.execute("PRAGMA synchronous = FULL")
+
+    @event.listens_for(engine, "begin")
+    def begin_explicitly(connection: Connection) -> None:
+        connection.exec_driver_sql(begin)
+
+    return engine
+
+
+def _use_wal(connection: sqlite3.Connection, timeout_s: float) -> None:
+    """Switch the file to WAL, once in its life; SQLite does not wait for other connections here."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(_WAL_RETRY_S)
+        else:
+            return
