@@ -23,8 +23,6 @@ NOT_WORTH_IT = "not_worth_it"
 STEP_LIMIT = "step_limit"
 NOT_CHOSEN = "not_chosen"
 
-TIME_SLACK = 1 + simulator.TOLERANCE
-
 
 def unmet_targets(
     problem: Problem, arrays: ProblemArrays, episodes: simulator.Episodes, visits: Sequence[int]
@@ -61,9 +59,9 @@ def _reason(
     reach = arrays.dis[0] + arrays.start_target[0, :, j]
     if arrays.return_to_base[0]:
         reach = reach + arrays.home[0, :, j]
-    missing = np.where(carriers, reach - arrays.voyage[0] * TIME_SLACK, np.inf)
-    reaching = missing <= 0
+    reaching = carriers & (reach <= arrays.voyage[0] * (1 + simulator.TOLERANCE))
     if not reaching.any():
+        missing = (reach - arrays.voyage[0])[carriers]
         return OUT_OF_RANGE, (
             f"no UAV that carries what it needs has the range: the best lacks {missing.min():.6g}"
         )
