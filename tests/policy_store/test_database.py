@@ -1,0 +1,312 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
+
+from policy_store.database import Database
+from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
+from policy_store.library import PolicyLibrary
+from policy_store.tables import metadata
+
+ROOT = Path(__file__).parents[2]
+
+
+def start(program: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(program), *arguments],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def scalar(database: Database, query: str) -> object:
+    with database.read() as connection:
+        return connection.execute(text(query)).scalar_one()
+
+
+@pytest.fixture
+def counter(database: Database) -> Database:
+    with database.write() as connection:
+        connection.execute(text("CREATE TABLE counter (value INTEGER NOT NULL)"))
+        connection.execute(text("INSERT INTO counter VALUES (0)"))
+    return database
+
+
+def increment(database: Database, times: int) -> None:
+    for _ in range(times):
+        with database.write() as connection:
+            value = connection.execute(text("SELECT value FROM counter")).scalar_one()
+            connection.execute(text("UPDATE counter SET value = :value"), {"value": value + 1})
+
+
+def test_no_update_is_lost_when_threads_read_then_write(counter: Database) -> None:
+    with ThreadPoolExecutor(8) as threads:
+        for done in [threads.submit(increment, counter, 25) for _ in range(8)]:
+            done.result()
+    assert scalar(counter, "SELECT value FROM counter") == 200
+
+
+def test_no_update_is_lost_between_two_objects_and_two_processes(counter: Database, url: str) -> None:
+    program = """
+        import sys
+        from sqlalchemy import text
+        from policy_store.database import Database
+        database = Database(sys.argv[1])
+        for _ in range(25):
+            with database.write() as connection:
+                value = connection.execute(text("SELECT value FROM counter")).scalar_one()
+                connection.execute(text("UPDATE counter SET value = :value"), {"value": value + 1})
+    """
+    other = Database(url)
+    process = start(program, url)
+    with ThreadPoolExecutor(2) as threads:
+        for done in [threads.submit(increment, each, 25) for each in (counter, other)]:
+            done.result()
+    assert process.communicate(timeout=60)[1] == ""
+    assert scalar(counter, "SELECT value FROM counter") == 75
+    other.dispose()
+
+
+def test_an_exception_rolls_the_transaction_back(counter: Database) -> None:
+    def set_and_fail() -> None:
+        with counter.write() as connection:
+            connection.execute(text("UPDATE counter SET value = 7"))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        set_and_fail()
+    assert scalar(counter, "SELECT value FROM counter") == 0
+    increment(counter, 1)
+    assert scalar(counter, "SELECT value FROM counter") == 1
+
+
+def test_a_reader_keeps_its_state_while_another_thread_writes(counter: Database) -> None:
+    with counter.read() as connection:
+        before = connection.execute(text("SELECT value FROM counter")).scalar_one()
+        writer = threading.Thread(target=increment, args=(counter, 3))
+        writer.start()
+        writer.join()
+        after = connection.execute(text("SELECT value FROM counter")).scalar_one()
+    assert (before, after) == (0, 0)
+    assert scalar(counter, "SELECT value FROM counter") == 3
+
+
+def test_a_reader_cannot_write(counter: Database) -> None:
+    with counter.read() as connection, pytest.raises(OperationalError, match="readonly"):
+        connection.execute(text("UPDATE counter SET value = 1"))
+
+
+def test_a_nested_write_fails_instead_of_waiting_for_itself(counter: Database, url: str) -> None:
+    same_file = Database(url)
+    with counter.write(), pytest.raises(NestedWrite), same_file.write():
+        pass
+    increment(counter, 1)
+    same_file.dispose()
+
+
+def test_settings_of_the_connections(database: Database) -> None:
+    pragmas = ("journal_mode", "synchronous", "busy_timeout", "foreign_keys", "query_only")
+    with database.write() as connection:
+        writer = [connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in pragmas]
+    with database.read() as connection:
+        reader = [connection.exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in pragmas]
+    assert writer == ["wal", 2, 10_000, 1, 0]
+    assert (reader[0], *reader[2:]) == ("wal", 10_000, 1, 1)
+
+
+@pytest.mark.parametrize(
+    "url", ["sqlite://", "sqlite:///:memory:", "sqlite:///file:x?uri=true", "mysql://host/name", "nonsense"]
+)
+def test_databases_that_cannot_be_used_are_refused(url: str) -> None:
+    with pytest.raises(UnsupportedDatabase):
+        Database(url)
+
+
+def test_a_password_is_not_shown() -> None:
+    with pytest.raises(UnsupportedDatabase) as refused:
+        Database("postgresql://user:secret@host/name")
+    assert "secret" not in str(refused.value)
+
+
+@pytest.mark.parametrize("ending", ["_exit", "SIGKILL"])
+def test_what_was_committed_survives_a_crash_and_nothing_else(
+    counter: Database, url: str, ending: str
+) -> None:
+    program = """
+        import os, sys
+        from sqlalchemy import text
+        from policy_store.database import Database
+        database = Database(sys.argv[1])
+        with database.write() as connection:
+            connection.execute(text("UPDATE counter SET value = 1"))
+            connection.execute(text("CREATE TABLE padding (data BLOB)"))
+        with database.write() as connection:
+            connection.execute(text("UPDATE counter SET value = 2"))
+            # More than SQLite's page cache holds: pages of the open transaction reach the log.
+            for _ in range(40):
+                connection.execute(text("INSERT INTO padding VALUES (randomblob(200000))"))
+            print("inside", flush=True)
+            if sys.argv[2] == "_exit":
+                os._exit(1)
+            sys.stdin.read()
+    """
+    process = start(program, url, ending)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if ending == "SIGKILL":
+        os.kill(process.pid, signal.SIGKILL)
+    assert line == "inside\n", process.communicate(timeout=60)
+    process.communicate(timeout=60)
+    assert process.returncode == (1 if ending == "_exit" else -signal.SIGKILL)
+
+    assert scalar(counter, "SELECT value FROM counter") == 1
+    assert scalar(counter, "SELECT count(*) FROM padding") == 0
+    assert scalar(counter, "PRAGMA integrity_check") == "ok"
+    increment(counter, 1)
+    assert scalar(counter, "SELECT value FROM counter") == 2
+
+
+def test_migrations_make_the_tables_that_the_program_uses(database: Database) -> None:
+    library = PolicyLibrary(database)
+    library.migrate()
+    library.migrate()
+    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0001"
+    assert scalar(database, "SELECT revision FROM library_revision") == 0
+    with database.read() as connection:
+        context = MigrationContext.configure(
+            connection, opts={"version_table": "alembic_version_library", "compare_type": True}
+        )
+        assert compare_metadata(context, metadata) == []
+
+
+def test_processes_that_migrate_at_once_all_succeed(url: str) -> None:
+    program = """
+        import sys
+        from policy_store.database import Database
+        from policy_store.library import PolicyLibrary
+        library = PolicyLibrary(Database(sys.argv[1]))
+        print("ready", flush=True)
+        sys.stdin.readline()
+        library.migrate()
+        print(library.count())
+    """
+    processes = [start(program, url) for _ in range(3)]
+    for process in processes:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    assert [process.communicate(timeout=60) for process in processes] == [("0\n", "")] * 3
+
+
+def test_threads_that_migrate_at_once_all_succeed(url: str) -> None:
+    databases = [Database(url) for _ in range(6)]
+    barrier = threading.Barrier(len(databases))
+
+    def migrate(database: Database) -> int:
+        library = PolicyLibrary(database)
+        barrier.wait()
+        library.migrate()
+        return library.count()
+
+    with ThreadPoolExecutor(len(databases)) as threads:
+        assert list(threads.map(migrate, databases)) == [0] * 6
+    for database in databases:
+        database.dispose()
+
+
+def write_migrations(folder: Path, *bodies: str) -> Path:
+    """Write an Alembic folder whose upgrades have the given bodies."""
+    (folder / "versions").mkdir(parents=True)
+    environment = ROOT / "policy_store" / "migrations" / "env.py"
+    (folder / "env.py").write_text(environment.read_text())
+    for number, body in enumerate(bodies, start=1):
+        before = json.dumps(str(number - 1)) if number > 1 else "None"
+        (folder / "versions" / f"{number}.py").write_text(
+            "import sqlalchemy as sa\nfrom alembic import op\n"
+            f"revision = '{number}'\ndown_revision = {before}\n"
+            f"def upgrade():\n{textwrap.indent(textwrap.dedent(body), '    ')}\n"
+        )
+    return folder
+
+
+def test_a_migration_that_fails_leaves_everything_as_it_was(database: Database, tmp_path: Path) -> None:
+    folder = write_migrations(
+        tmp_path / "50%",
+        "op.execute('CREATE TABLE a (x INTEGER)')",
+        "op.execute('INSERT INTO nowhere VALUES (1)')",
+    )
+    with pytest.raises(OperationalError, match="nowhere"):
+        database.migrate(folder, "version_other")
+    assert scalar(database, "SELECT count(*) FROM sqlite_master") == 0
+
+
+def test_rooms_migrate_side_by_side(library: PolicyLibrary, database: Database, tmp_path: Path) -> None:
+    folder = write_migrations(tmp_path / "other", "op.execute('CREATE TABLE a (x INTEGER)')")
+    database.migrate(folder, "version_other")
+    assert scalar(database, "SELECT version_num FROM version_other") == "1"
+    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0001"
+
+
+def test_a_database_of_a_newer_program_is_refused(database: Database, tmp_path: Path) -> None:
+    newer = write_migrations(tmp_path / "newer", "pass", "pass")
+    older = write_migrations(tmp_path / "older", "pass")
+    database.migrate(newer, "version_other")
+    with pytest.raises(MigrationFailed, match="'2'"):
+        database.migrate(older, "version_other")
+
+
+PARENT_AND_CHILD = """
+    op.execute("CREATE TABLE parent (id INTEGER PRIMARY KEY, name TEXT)")
+    op.execute("CREATE TABLE child (parent_id INTEGER REFERENCES parent (id) ON DELETE CASCADE)")
+    op.execute("INSERT INTO parent VALUES (1, 'a')")
+    op.execute("INSERT INTO child VALUES (1)")
+"""
+
+
+def test_rebuilding_a_table_keeps_the_rows_that_refer_to_it(database: Database, tmp_path: Path) -> None:
+    rebuild = """
+        with op.batch_alter_table("parent", recreate="always") as batch:
+            batch.alter_column("name", nullable=True, type_=sa.String(20))
+    """
+    database.migrate(write_migrations(tmp_path / "other", PARENT_AND_CHILD, rebuild), "version_other")
+    assert scalar(database, "SELECT count(*) FROM child") == 1
+    with database.write() as connection:
+        connection.execute(text("DELETE FROM parent"))
+    assert scalar(database, "SELECT count(*) FROM child") == 0
+
+
+def test_a_migration_that_breaks_references_is_undone(database: Database, tmp_path: Path) -> None:
+    folder = write_migrations(tmp_path / "other", PARENT_AND_CHILD)
+    database.migrate(folder, "version_other")
+    breaking = write_migrations(tmp_path / "breaking", PARENT_AND_CHILD, "op.execute('DELETE FROM parent')")
+    with pytest.raises(MigrationFailed, match="child refers to a missing row of parent"):
+        database.migrate(breaking, "version_other")
+    assert scalar(database, "SELECT count(*) FROM parent") == 1
+    assert scalar(database, "SELECT version_num FROM version_other") == "1"
+
+
+def test_the_store_imports_neither_the_application_nor_torch() -> None:
+    program = """
+        import pkgutil, importlib, sys, policy_store
+        for module in pkgutil.iter_modules(policy_store.__path__, "policy_store."):
+            importlib.import_module(module.name)
+        print(sorted({"app", "torch", "numba", "fastapi"} & sys.modules.keys()))
+    """
+    assert start(program).communicate(timeout=60) == ("[]\n", "")
