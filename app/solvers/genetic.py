@@ -1,0 +1,193 @@
+"""The paper's genetic algorithm (section 5.2.2, Table 2) on the compiled simulator.
+
+The paper gives its parameters and no operators. Here a chromosome holds, for every UAV, an ordered list of
+S targets. It is decoded through the simulator: at each step a UAV takes the first entry left in its list that
+is allowed at that moment, and flies home when the list is used up or says so; every chromosome is a legal
+plan. Parents are chosen by binary tournaments, a child takes each UAV's whole list from either parent, each
+gene may be redrawn, and the best chromosome survives.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from app.domain.errors import ProblemTooLarge
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
+from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.solvers.parameters import GeneticParameters
+from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
+
+CHUNK_GENES = 100_000
+"""Genes decoded between two looks at the stop criterion: some milliseconds."""
+
+MAX_GENES = 50_000_000
+"""Largest population times steps times UAVs; a population of that size takes 400 MB, twice."""
+
+
+class Flight(NamedTuple):
+    """What it takes to fly one chromosome after the other.
+
+    Attributes
+    ----------
+    arrays
+        A stack of one problem.
+    episodes
+        One episode, overwritten by every flight.
+    cursor
+        (M,) first entry of each UAV's list that is left.
+    actions
+        (S, M) the plan of the last flight.
+    """
+
+    arrays: ProblemArrays
+    episodes: Episodes
+    cursor: Integers
+    actions: Integers
+
+
+class GeneticAlgorithm:
+    """A :class:`~app.solvers.protocol.Solver`; an epoch of its history is a generation."""
+
+    def __init__(self, parameters: GeneticParameters, context: SolverContext) -> None:  # noqa: ARG002
+        self.parameters = parameters
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """See :class:`~app.solvers.protocol.Solver`."""
+        _check_size(self.parameters.num_total, problem)
+        rng = np.random.default_rng(seed)
+        genes = (problem.max_steps, problem.n_uavs)
+        arrays = compile_problem(problem)
+        flight = Flight(
+            arrays, new_episodes(arrays, 1), np.empty(problem.n_uavs, np.int64), np.empty(genes, np.int64)
+        )
+        population = rng.integers(0, problem.n_targets + 1, (self.parameters.num_total, *genes))
+        # Flying nowhere is a plan too: the answer is legal and earns 0 however early it must stop.
+        population[0] = problem.n_targets
+        fitness = np.full(len(population), -np.inf)
+        unborn = population[:1] if stop() else population
+        for c, chromosome in enumerate(unborn):
+            fitness[c] = decode(flight, chromosome)
+
+        def incumbent() -> Plan:
+            decode(flight, population[fitness.argmax()])
+            return Plan.of(flight.actions, problem.n_targets)
+
+        history = History()
+        history.add(0, float(fitness.max()))
+        generations, done = self.parameters.iteration, 0
+        chunk = max(1, CHUNK_GENES // population.size)
+        while done < generations and not stop():
+            best = np.empty(min(chunk, generations - done))
+            rates = self.parameters.crossover_rate, self.parameters.mutation_rate
+            population, fitness = evolve(flight, population, fitness, best, rates, rng)
+            for reward in best:
+                done += 1
+                history.add(done, float(reward))
+            report(Progress(done / generations, done, float(best[-1]), incumbent()))
+        return Solution(incumbent(), history, self.parameters)
+
+
+def _check_size(num_total: int, problem: Problem) -> None:
+    genes = num_total * problem.max_steps * problem.n_uavs
+    if genes > MAX_GENES:
+        raise ProblemTooLarge(
+            f"num_total {num_total} times {problem.max_steps} steps times {problem.n_uavs} UAVs are {genes} "
+            f"genes; the limit is {MAX_GENES}",
+            details={"genes": genes, "limit": MAX_GENES},
+        )
+
+
+@compiled
+def decode(flight: Flight, genes: Integers) -> float:
+    """Fly a chromosome, leave its plan in ``flight.actions`` and return its reward.
+
+    Parameters
+    ----------
+    flight
+        Scratch space.
+    genes
+        (S, M); column i is UAV i's list of targets, N ends it.
+    """
+    arrays, episodes = flight.arrays, flight.episodes
+    home = arrays.level.shape[1]
+    steps, m = genes.shape
+    reset_one(arrays, episodes, 0)
+    reward = 0.0
+    for i in range(m):
+        flight.cursor[i] = 0
+    for s in range(steps):
+        for i in range(m):
+            action = home
+            while flight.cursor[i] < steps:
+                gene = genes[flight.cursor[i], i]
+                flight.cursor[i] += 1
+                if gene == home or verdict(arrays, episodes, 0, i, gene) == ALLOWED:
+                    action = gene
+                    break
+            flight.actions[s, i] = action
+            reward += act(arrays, episodes, 0, i, action)
+    for i in range(m):
+        reward += act(arrays, episodes, 0, i, home)
+    return reward
+
+
+@njit(cache=True, error_model="numpy")
+def evolve(
+    flight: Flight,
+    population: Integers,
+    fitness: Floats,
+    best: Floats,
+    rates: tuple[float, float],
+    rng: np.random.Generator,
+) -> tuple[Integers, Floats]:
+    """Breed as many generations as `best` has room for, writing each one's best reward there.
+
+    Parameters
+    ----------
+    flight
+        Scratch space.
+    population, fitness
+        (P, S, M) chromosomes and (P,) their rewards.
+    best
+        (G,), overwritten.
+    rates
+        Probability that two parents are crossed, and that a gene is redrawn.
+    rng
+        The only source of randomness.
+
+    Returns
+    -------
+    population, fitness
+        After G generations.
+    """
+    crossover_rate, mutation_rate = rates
+    size, steps, m = population.shape
+    home = flight.arrays.level.shape[1]
+    children, child_fitness = np.empty_like(population), np.empty_like(fitness)
+    for generation in range(len(best)):
+        children[0], child_fitness[0] = population[np.argmax(fitness)], fitness.max()
+        for c in range(1, size):
+            mother = population[_winner(fitness, rng)]
+            father = population[_winner(fitness, rng)] if rng.random() < crossover_rate else mother
+            for i in range(m):
+                parent = mother if rng.random() < 0.5 else father
+                for s in range(steps):
+                    redrawn = rng.random() < mutation_rate
+                    children[c, s, i] = rng.integers(0, home + 1) if redrawn else parent[s, i]
+            child_fitness[c] = decode(flight, children[c])
+        population, children = children, population
+        fitness, child_fitness = child_fitness, fitness
+        best[generation] = fitness.max()
+    return population, fitness
+
+
+@njit(cache=True, error_model="numpy")
+def _winner(fitness: Floats, rng: np.random.Generator) -> int:
+    """Binary tournament."""
+    a, b = rng.integers(0, len(fitness)), rng.integers(0, len(fitness))
+    return int(a if fitness[a] >= fitness[b] else b)
