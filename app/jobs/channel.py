@@ -1,0 +1,117 @@
+"""What happens to a job, told to everybody in this process who listens."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections import OrderedDict, deque
+from collections.abc import Iterator
+from dataclasses import replace
+
+from app.jobs.model import Job, JobEvent, Progress
+
+# A progress supersedes those before it: a listener that is further behind misses nothing that still holds.
+_REMEMBERED_EVENTS = 256
+_REMEMBERED_ENDS = 64
+
+
+class Channel:
+    """The events of one job, and a bell that rings at each.
+
+    Attributes
+    ----------
+    progress
+        The newest; None if none was reported since the service started.
+    ended
+        The job at its end.
+    changed
+        Set at the next event, and then replaced: take it before looking, wait for it after.
+    """
+
+    def __init__(self) -> None:
+        self.progress: Progress | None = None
+        self.ended: Job | None = None
+        self.changed = asyncio.Event()
+        self._events: deque[JobEvent] = deque(maxlen=_REMEMBERED_EVENTS)
+
+    def report(self, progress: Progress) -> None:
+        """Tell of progress."""
+        self.progress = progress
+        self._publish(JobEvent(self._next_id(time.time()), "progress", progress.as_json()))
+
+    def end(self, job: Job) -> None:
+        """Tell of the end; nothing is told after it."""
+        if self.ended is None:
+            self.ended = job
+            final = end_event(job)
+            self._publish(replace(final, id=max(final.id, self._next_id(0.0))))
+
+    def since(self, after: int) -> Iterator[JobEvent]:
+        """Return the remembered events with a larger id."""
+        return iter([event for event in self._events if event.id > after])
+
+    def ring(self) -> None:
+        """Wake everybody who waits, to look again."""
+        self.changed.set()
+        self.changed = asyncio.Event()
+
+    def _next_id(self, now: float) -> int:
+        return max(_id(now), self._events[-1].id + 1 if self._events else 0)
+
+    def _publish(self, event: JobEvent) -> None:
+        self._events.append(event)
+        self.ring()
+
+
+class Channels:
+    """The channels of the jobs that go on, and of the last that ended."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, Channel] = {}
+        self._ended: OrderedDict[str, Channel] = OrderedDict()
+
+    def find(self, job_id: str) -> Channel | None:
+        """Return a job's channel if it has one."""
+        return self._open.get(job_id) or self._ended.get(job_id)
+
+    def open(self, job_id: str) -> Channel:
+        """Return a job's channel, a new one if it has none."""
+        return self.find(job_id) or self._open.setdefault(job_id, Channel())
+
+    def end(self, job: Job) -> None:
+        """Tell a job's end to those who listen."""
+        channel = self.open(job.id)
+        channel.end(job)
+        self._open.pop(job.id, None)
+        self._ended[job.id] = channel
+        if len(self._ended) > _REMEMBERED_ENDS:
+            self._ended.popitem(last=False)
+
+    def ring(self) -> None:
+        """Wake everybody who waits on any channel, to look again."""
+        for channel in self._open.values():
+            channel.ring()
+
+
+def replay(job: Job) -> list[JobEvent]:
+    """Return the events of a finished job whose channel is gone: its last progress and its end."""
+    final = end_event(job)
+    return [JobEvent(final.id - 1, "progress", job.progress.as_json()), final]
+
+
+def end_event(job: Job) -> JobEvent:
+    """Return the last event of a finished job; its id is that of a moment after the last progress."""
+    finished = job.finished_at.timestamp() if job.finished_at is not None else 0.0
+    return JobEvent(_id(finished) + 1, "end", {**job.progress.as_json(), "status": job.status.value})
+
+
+async def rung(bell: asyncio.Event, timeout_s: float) -> None:
+    """Wait for a bell, at most so long."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(timeout_s):
+            await bell.wait()
+
+
+def _id(seconds: float) -> int:
+    return int(seconds * 1000)

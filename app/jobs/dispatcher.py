@@ -1,0 +1,383 @@
+"""Takes jobs in, gives them to workers, and brings what becomes of them into the table.
+
+Everything here runs on one event loop; what touches the disk runs in threads. All writing to the job table
+goes through one thread, so what is known here about the table changes in the order of its commits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, ParamSpec, TypeVar
+
+from sqlalchemy.exc import OperationalError
+
+from app.jobs.channel import Channels, rung
+from app.jobs.errors import Draining, UnknownJobKind
+from app.jobs.executor import Execution, Executor, Outcome, Raised, Returned
+from app.jobs.failure import describe, failure
+from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
+from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
+from app.jobs.owner import is_alive
+from app.jobs.store import Claim, JobStore, QueueLimit
+
+_SAVE_INTERVAL_S = 1.0
+_RECOVER_INTERVAL_S = 15.0
+_WRITE_ATTEMPTS, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
+_SETTLE_S = 20.0
+
+_log = logging.getLogger(__name__)
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(slots=True, eq=False)
+class _Run:
+    """A job that runs here."""
+
+    job: Job
+    deadline: float | None
+    progress: Progress
+    saved_at: float
+    unsaved: bool = False
+    execution: Execution | None = None
+    killed_for: Literal["time", "cancel", "stop"] | None = None
+    timers: list[asyncio.TimerHandle] = field(default_factory=list)
+
+    def kill(self, reason: Literal["time", "cancel", "stop"]) -> None:
+        if self.killed_for is None and self.execution is not None:
+            self.killed_for = reason
+            self.execution.kill()
+
+
+class Dispatcher:
+    """Everything of the service that changes jobs.
+
+    Parameters
+    ----------
+    store
+        The job table.
+    owner
+        In whose name the store takes jobs.
+    kinds, executor, max_queued, overrun_grace_s
+        As given to :class:`app.jobs.service.JobService`.
+    channels
+        Who listens to which job.
+    """
+
+    def __init__(
+        self,
+        store: JobStore,
+        owner: str,
+        kinds: Sequence[JobKind],
+        executor: Executor,
+        channels: Channels,
+        *,
+        max_queued: int,
+        overrun_grace_s: float,
+    ) -> None:
+        self._store = store
+        self._owner = owner
+        self._kinds = {kind.name: kind for kind in kinds}
+        self._executor = executor
+        self._channels = channels
+        self._max_queued = max_queued
+        self._grace_s = overrun_grace_s
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="jobs-write")
+        self._lanes = Lanes(executor.capacity)
+        self._runs: dict[str, _Run] = {}
+        self._dispatching: asyncio.Task[None] | None = None
+        self._housekeeping: asyncio.Task[None] | None = None
+        self._requests: set[asyncio.Task[Any]] = set()
+        self._finishing: set[asyncio.Task[Any]] = set()
+        self._wake = asyncio.Event()
+        self._accepting = False
+        self._ended = asyncio.Event()
+
+    async def start(self) -> None:
+        """Make the tables, give back what an earlier process left running, and begin to work."""
+        await self._write(self._store.migrate)
+        await self._recover()
+        for lane in LANES:
+            durations = await self._write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
+            self._lanes.ran(lane, durations)
+        self._accepting = True
+        await self._executor.start(self._wake.set)
+        self._wake.set()
+        self._dispatching = asyncio.create_task(self._dispatch())
+        self._housekeeping = asyncio.create_task(self._keep_house())
+
+    async def stop(self, grace_s: float) -> None:
+        """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
+        self._accepting = False
+        self._wake.set()
+        # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
+        if self._requests:
+            await asyncio.wait(self._requests)
+        if self._dispatching is not None:
+            await self._dispatching
+        if self._finishing:
+            await asyncio.wait(self._finishing, timeout=grace_s)
+        for run in self._runs.values():
+            run.kill("stop")
+        if self._finishing:
+            await asyncio.wait(self._finishing, timeout=_SETTLE_S)
+        self._ended.set()
+        if self._housekeeping is not None:
+            await self._housekeeping
+        await self._executor.close()
+        await asyncio.to_thread(self._writer.shutdown)
+
+    async def admit(
+        self,
+        kind: str,
+        payload: dict[str, Any],
+        time_limit_s: float | None,
+        idempotency: Idempotency | None,
+    ) -> tuple[Job, bool]:
+        """Take in a job, see :meth:`app.jobs.service.JobService.submit`."""
+        if not self._accepting:
+            raise Draining
+        if kind not in self._kinds:
+            raise UnknownJobKind(kind)
+        admit = self._admit(self._kinds[kind], payload, time_limit_s, idempotency)
+        return await asyncio.shield(_spawn(admit, self._requests))
+
+    async def _admit(
+        self,
+        kind: JobKind,
+        payload: dict[str, Any],
+        time_limit_s: float | None,
+        idempotency: Idempotency | None,
+    ) -> tuple[Job, bool]:
+        lane = kind.lane
+        run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
+        limit = QueueLimit(self._max_queued, self._lanes.time_to_work_off(lane, self._max_queued))
+        if run_now:
+            self._lanes.running[lane] += 1
+        try:
+            claim, created = await self._write(
+                self._store.insert,
+                kind,
+                payload,
+                run_now=run_now,
+                limit=limit,
+                time_limit_s=time_limit_s,
+                idempotency=idempotency,
+            )
+        except BaseException:
+            if run_now:
+                self._give_back(lane)
+            raise
+        if created and run_now:
+            self._begin(claim)
+        elif created:
+            self._lanes.waiting[lane] += 1
+            self._wake.set()
+        elif run_now:
+            self._give_back(lane)
+        return claim.job, created
+
+    async def cancel(self, job_id: str) -> Job:
+        """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""
+        if self._ended.is_set():
+            raise Draining
+        return await asyncio.shield(_spawn(self._cancel(job_id), self._requests))
+
+    async def _cancel(self, job_id: str) -> Job:
+        job, before = await self._write(self._store.cancel, job_id)
+        if before is JobStatus.QUEUED:
+            self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
+            self._channels.end(job)
+        run = self._runs.get(job_id)
+        if before is JobStatus.RUNNING and run is not None and run.execution is not None:
+            run.execution.cancel()
+            run.timers.append(asyncio.get_running_loop().call_later(self._grace_s, run.kill, "cancel"))
+        return self.newest(job)
+
+    def load(self) -> Load:
+        """Return how busy the workers are."""
+        return Load(
+            capacity=self._executor.capacity,
+            ready=self._executor.ready,
+            running=dict(self._lanes.running),
+            waiting=dict(self._lanes.waiting),
+        )
+
+    def runs(self, job_id: str) -> bool:
+        """Say whether a job runs here; its channel then tells all that happens to it."""
+        return job_id in self._runs
+
+    def newest(self, job: Job) -> Job:
+        """Return a job with the progress that is known here and not yet in the table."""
+        run = self._runs.get(job.id)
+        if run is None or job.status is not JobStatus.RUNNING:
+            return job
+        return replace(job, progress=run.progress)
+
+    async def _dispatch(self) -> None:
+        """Give free workers to the jobs that wait."""
+        while self._accepting:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._accepting and (lane := self._lanes.next_lane(self._executor.ready)) is not None:
+                self._lanes.running[lane] += 1
+                try:
+                    claim = await self._write(self._store.claim, lane)
+                except Exception:
+                    self._lanes.running[lane] -= 1
+                    _log.exception("no job could be taken from the queue; there will be another try")
+                    await asyncio.sleep(_FIRST_PAUSE_S)
+                    continue
+                self._lanes.waiting[lane] = 0 if claim is None else max(0, self._lanes.waiting[lane] - 1)
+                if claim is None:
+                    self._lanes.running[lane] -= 1
+                else:
+                    self._begin(claim)
+
+    def _begin(self, claim: Claim) -> None:
+        """Hand a job to the executor, in the same step in which its commit became known here.
+
+        So a cancellation, which is committed after it, finds it in ``_runs``.
+        """
+        job = claim.job
+        run = _Run(job, claim.deadline, job.progress, saved_at=time.monotonic())
+        self._runs[job.id] = run
+        channel = self._channels.open(job.id)
+
+        def on_progress(progress: Progress) -> None:
+            run.progress, run.unsaved = progress, True
+            channel.report(progress)
+
+        left = None if claim.deadline is None else claim.deadline - time.time()
+        run.execution = self._executor.submit(
+            self._kinds[job.kind].work, job.payload, time_left_s=left, on_progress=on_progress
+        )
+        if left is not None:
+            loop = asyncio.get_running_loop()
+            run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
+        _spawn(self._finish(run, run.execution), self._finishing)
+
+    async def _finish(self, run: _Run, execution: Execution) -> None:
+        """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
+        begun = time.monotonic()
+        job: Job | None = None
+        try:
+            outcome = await execution.outcome()
+            took = time.monotonic() - begun
+            for timer in run.timers:
+                timer.cancel()
+            job = await self._settle(run, outcome)
+        except Exception:
+            _log.exception("job %s: its end could not be stored; the next start runs it again", run.job.id)
+        else:
+            if job is None:
+                _log.warning("job %s went on without attempt %d", run.job.id, run.job.attempt)
+            elif job.status is JobStatus.SUCCEEDED:
+                self._lanes.ran(job.lane, [took])
+        del self._runs[run.job.id]
+        if job is not None and job.status.finished:
+            self._channels.end(job)
+        elif job is not None:
+            self._lanes.waiting[job.lane] += 1
+        self._give_back(run.job.lane)
+
+    async def _settle(self, run: _Run, outcome: Outcome) -> Job | None:
+        """Bring an outcome into the table; None if the job has gone on without this attempt."""
+        job, progress = run.job, run.progress
+        if isinstance(outcome, Returned):
+            try:
+                return await self._write_surely(
+                    self._store.succeed,
+                    job.id,
+                    job.attempt,
+                    outcome.work,
+                    progress,
+                    self._kinds[job.kind].on_success,
+                )
+            except Exception as exception:
+                _log.exception("job %s: its result could not be stored", job.id)
+                outcome = Raised(describe(exception), "")
+        if isinstance(outcome, Raised):
+            if outcome.traceback:
+                _log.warning("job %s failed: %s\n%s", job.id, outcome.error["detail"], outcome.traceback)
+            return await self._write_surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
+        if run.killed_for == "stop":
+            return await self._write_surely(self._store.release, job.id, job.attempt, progress)
+        if run.killed_for == "time":
+            error = failure(
+                "time-limit-exceeded",
+                f"the work did not stop within {self._grace_s:g} s after its time limit, and was ended",
+            )
+            return await self._write_surely(self._store.fail, job.id, job.attempt, error, progress)
+        _log.warning("job %s, attempt %d: %s", job.id, job.attempt, outcome.reason)
+        return await self._write_surely(self._store.lose, job.id, job.attempt, outcome.reason, progress)
+
+    def _give_back(self, lane: Lane) -> None:
+        self._lanes.running[lane] -= 1
+        self._wake.set()
+
+    async def _keep_house(self) -> None:
+        """Store progress now and then, and look for jobs that nobody runs."""
+        recovered = time.monotonic()
+        while not self._ended.is_set():
+            await rung(self._ended, _SAVE_INTERVAL_S)
+            try:
+                await self._save_progress()
+                if time.monotonic() - recovered >= _RECOVER_INTERVAL_S:
+                    recovered = time.monotonic()
+                    await self._recover()
+                    self._wake.set()
+            except Exception:
+                _log.exception("housekeeping failed; there will be another try")
+
+    async def _save_progress(self) -> None:
+        now = time.monotonic()
+        due = [run for run in self._runs.values() if run.unsaved and now - run.saved_at >= _SAVE_INTERVAL_S]
+        if not due:
+            return
+        for run in due:
+            run.unsaved, run.saved_at = False, now
+        await self._write(
+            self._store.save_progress, [(run.job.id, run.job.attempt, run.progress) for run in due]
+        )
+
+    async def _recover(self) -> None:
+        changed = await self._write(
+            self._store.recover, tuple(self._kinds), lambda owner: is_alive(owner, self._owner)
+        )
+        for job in changed:
+            _log.warning("job %s was left behind by an earlier process: %s", job.id, job.status)
+            if job.status.finished:
+                self._channels.end(job)
+        waiting = await self._write(self._store.waiting)
+        self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
+
+    async def _write(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run a function of the store in the one thread that writes."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._writer, lambda: function(*args, **kwargs))
+
+    async def _write_surely(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Write what must not be lost: a database that is locked or full is tried again for a while."""
+        pause = _FIRST_PAUSE_S
+        for _ in range(_WRITE_ATTEMPTS - 1):
+            try:
+                return await self._write(function, *args, **kwargs)
+            except OperationalError:
+                _log.exception("the database could not be written; next try in %.1f s", pause)
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+        return await self._write(function, *args, **kwargs)
+
+
+def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:
+    """Run a coroutine that goes on if its caller is cancelled; ``among`` keeps it from being collected."""
+    task = asyncio.create_task(work)
+    among.add(task)
+    task.add_done_callback(among.discard)
+    return task

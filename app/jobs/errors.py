@@ -1,0 +1,72 @@
+"""Every error that the jobs room raises on purpose.
+
+JobError
+ ├─ QueueFull               a lane's queue has no place left; ``retry_after_s`` says when to come back
+ ├─ Draining                the service is stopping and takes no new job
+ ├─ JobNotFound             no job has that id
+ ├─ UnknownJobKind          no kind of job has that name
+ ├─ InvalidCursor           a page was asked for with a cursor that no page gave out
+ └─ IdempotencyMismatch     an idempotency key was used before with another body
+
+A retry with a known key and the same body is never an error: it gets the first job, which the caller waits
+for as the first caller does, be it queued, running or finished.
+"""
+
+from __future__ import annotations
+
+
+class JobError(Exception):
+    """Root of the tree."""
+
+
+class QueueFull(JobError):
+    """A lane's queue has no place left."""
+
+    def __init__(self, lane: str, limit: int, retry_after_s: float) -> None:
+        super().__init__(
+            f"the queue of {lane} jobs is full ({limit} waiting); "
+            f"it is expected to be worked off in {retry_after_s:.0f} s"
+        )
+        self.lane = lane
+        self.limit = limit
+        self.retry_after_s = retry_after_s
+
+
+class Draining(JobError):
+    """The service is stopping, or not started: it takes no new job."""
+
+    def __init__(self) -> None:
+        super().__init__("the service is stopping and takes no new jobs")
+
+
+class JobNotFound(JobError):
+    """No job has that id."""
+
+    def __init__(self, job_id: str) -> None:
+        super().__init__(f"there is no job {job_id!r}")
+        self.job_id = job_id
+
+
+class UnknownJobKind(JobError):
+    """No kind of job has that name."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(f"there is no kind of job {kind!r}")
+        self.kind = kind
+
+
+class InvalidCursor(JobError):
+    """A page was asked for with a cursor that no page gave out."""
+
+    def __init__(self, cursor: str) -> None:
+        super().__init__(f"{cursor!r} is not a cursor of a page of jobs")
+        self.cursor = cursor
+
+
+class IdempotencyMismatch(JobError):
+    """An idempotency key was used before with another body."""
+
+    def __init__(self, key: str, job_id: str) -> None:
+        super().__init__(f"idempotency key {key!r} was used with another body, for job {job_id!r}")
+        self.key = key
+        self.job_id = job_id

@@ -1,0 +1,207 @@
+"""What a job is: its states, its progress, its result; plain values without behaviour.
+
+States and the only ways between them::
+
+    queued ──> running ──> succeeded | failed | cancelled
+       │  <─────┘ (its worker or its owner is gone, or the service stopped)
+       └──> cancelled | failed
+
+Every dispatch counts ``attempt`` up, so a result of an earlier dispatch can be told and is dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+Lane = Literal["interactive", "training"]
+LANES: tuple[Lane, ...] = ("interactive", "training")
+
+
+class JobStatus(StrEnum):
+    """Where a job is in its life."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+    @property
+    def finished(self) -> bool:
+        """Whether the state is final."""
+        return self not in (JobStatus.QUEUED, JobStatus.RUNNING)
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is, and the best it has found.
+
+    Attributes
+    ----------
+    fraction
+        0 to 1.
+    epoch
+        Epochs done, where the work has epochs.
+    best_reward
+        Reward of the best plan so far.
+    assignment
+        The best plan so far: at most S joint actions of M targets each.
+    """
+
+    fraction: float = 0.0
+    epoch: int | None = None
+    best_reward: float | None = None
+    assignment: list[list[int]] | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields as a JSON object."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One job as it is in the table, with the newest progress.
+
+    Attributes
+    ----------
+    id
+        32 lower-case hexadecimal digits.
+    kind, lane
+        What is done, and the lane it waits in.
+    status
+        Where it is in its life.
+    payload
+        What the work function gets.
+    result
+        What the work function returned; a cancelled job has one if its work stopped by itself.
+    error
+        ``{"code", "detail", "violations": [{"pointer", "detail"}], "details": {}}`` of a failed job.
+    progress
+        The newest progress; after a crash the last one that was stored.
+    attempt
+        How often it was handed to a worker.
+    created_at, started_at, finished_at
+        UTC; ``started_at`` is of the newest attempt.
+    has_artifact
+        Whether the work left bytes behind.
+    """
+
+    id: str
+    kind: str
+    status: JobStatus
+    lane: Lane
+    payload: dict[str, Any]
+    result: dict[str, Any] | None
+    error: dict[str, Any] | None
+    progress: Progress
+    attempt: int
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+    has_artifact: bool
+
+
+@dataclass(frozen=True, slots=True)
+class JobPage:
+    """Jobs, newest first; ``next_cursor`` is None on the last page."""
+
+    jobs: tuple[Job, ...]
+    next_cursor: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """How busy the service is.
+
+    Attributes
+    ----------
+    capacity
+        Jobs that can run at a time when all workers are well.
+    ready
+        Workers that are warm now; the service answers quickly once there is one.
+    running, waiting
+        Jobs by lane.
+    """
+
+    capacity: int
+    ready: int
+    running: dict[Lane, int]
+    waiting: dict[Lane, int]
+
+
+@dataclass(frozen=True, slots=True)
+class JobEvent:
+    """One event of a job's stream.
+
+    Attributes
+    ----------
+    id
+        Grows within a job, over restarts of the service too (it is made of the time).
+    name
+        ``"progress"``, or ``"end"``, which comes once and last.
+    data
+        The progress fields; at the end also ``status``.
+    """
+
+    id: int
+    name: Literal["progress", "end"]
+    data: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Idempotency:
+    """A client's promise that requests with the same key are the same request.
+
+    Attributes
+    ----------
+    client
+        Whose key it is; keys of different clients never meet.
+    key
+        The key.
+    body_hash
+        Digest of everything in the request that must not differ.
+    """
+
+    client: str
+    key: str
+    body_hash: str
+
+
+@dataclass(frozen=True, slots=True)
+class WorkResult:
+    """What a work function returns: a JSON-ready result without NaN, and bytes to keep beside it."""
+
+    result: dict[str, Any]
+    artifact: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JobKind:
+    """What can be submitted.
+
+    Attributes
+    ----------
+    name
+        Its name in :meth:`app.jobs.service.JobService.submit`.
+    work
+        ``"module:function"``, resolved only in the worker; the function takes the payload and a
+        :class:`app.jobs.work_context.WorkContext` and returns a :class:`WorkResult`.
+    lane
+        ``"interactive"`` for what somebody waits for, ``"training"`` for what takes long.
+    on_success
+        Called inside the transaction that marks a job succeeded, in a thread of the web process; what it
+        returns is the stored result. It gets the job as it was while running. What it raises rolls the
+        transaction back, and the job fails with that reason. It must be quick: writers wait for it.
+    """
+
+    name: str
+    work: str
+    lane: Lane
+    on_success: Callable[[Connection, Job, WorkResult], dict[str, Any]] | None = None

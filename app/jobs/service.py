@@ -1,0 +1,236 @@
+"""Durable jobs as the rest of the program sees them: submit, wait, listen, cancel."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from app.jobs.channel import Channels, replay, rung
+from app.jobs.dispatcher import Dispatcher
+from app.jobs.executor import Executor
+from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, Load
+from app.jobs.owner import new_owner
+from app.jobs.store import Database, JobStore
+
+# Who waits for a job that another process runs is not told of its end, and looks at the table.
+_LOOK_AGAIN_S = 5.0
+
+
+class JobService:
+    """Durable jobs of some kinds, run by an executor.
+
+    A job is committed before :meth:`submit` returns, and from then on it is finished once, whatever dies:
+    what runs when its worker or this process dies waits again, ``max_attempts`` times. One service at a
+    time works on a database.
+
+    Parameters
+    ----------
+    database
+        Where the job tables are, or will be.
+    kinds
+        What can be submitted.
+    executor
+        Runs the work; it is started and closed by the service.
+    max_queued
+        How many jobs may wait in each lane.
+    max_attempts
+        How often a job may be lost with its worker or its process before it has failed.
+    overrun_grace_s
+        How long work may go on after it was cancelled or its time is up, before its worker is killed.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        kinds: Sequence[JobKind],
+        executor: Executor,
+        *,
+        max_queued: int = 64,
+        max_attempts: int = 3,
+        overrun_grace_s: float = 5.0,
+    ) -> None:
+        owner = new_owner()
+        self._store = JobStore(database, owner, max_attempts)
+        self._channels = Channels()
+        self._dispatcher = Dispatcher(
+            self._store,
+            owner,
+            kinds,
+            executor,
+            self._channels,
+            max_queued=max_queued,
+            overrun_grace_s=overrun_grace_s,
+        )
+        self._stopping = False
+        self._stopped = False
+
+    async def start(self) -> None:
+        """Make the tables, give back what an earlier process left running, and begin to work.
+
+        Workers start in the background; jobs wait until one is warm, see :meth:`load`.
+        """
+        await self._dispatcher.start()
+
+    async def stop(self, grace_s: float) -> None:
+        """Take no new jobs, end event streams, and let what runs go on for ``grace_s`` seconds at most.
+
+        What still runs then goes back to the queue, without loss of an attempt; the next start goes on with
+        it and with what waits. Waiting callers get their job as it is then.
+        """
+        self._stopping = True
+        self._channels.ring()
+        await self._dispatcher.stop(grace_s)
+        self._stopped = True
+        self._channels.ring()
+
+    async def submit(
+        self,
+        kind: str,
+        payload: dict[str, Any],
+        *,
+        time_limit_s: float | None = None,
+        idempotency: Idempotency | None = None,
+    ) -> tuple[Job, bool]:
+        """Take in a job; it is on disk when this returns, and finishes even if the caller is cancelled.
+
+        Parameters
+        ----------
+        kind
+            Name of one of the kinds.
+        payload
+            JSON-ready; what the work function gets.
+        time_limit_s
+            Counted from now, waiting included.
+        idempotency
+            A key that was seen before with the same body gives the first job, in whatever state it is: a
+            retry while it runs waits for it as the first caller does.
+
+        Returns
+        -------
+        tuple
+            The job, and whether it is new.
+
+        Raises
+        ------
+        Draining
+            If the service is stopping or was not started.
+        UnknownJobKind
+            If there is no such kind.
+        QueueFull
+            If it would have to wait, and no place is left in its lane's queue.
+        IdempotencyMismatch
+            If the key was seen with another body.
+        """
+        return await self._dispatcher.admit(kind, payload, time_limit_s, idempotency)
+
+    async def get(self, job_id: str) -> Job:
+        """Return a job with its newest progress.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        return self._dispatcher.newest(await asyncio.to_thread(self._store.get, job_id))
+
+    async def list(self, limit: int, cursor: str | None = None) -> JobPage:
+        """Return at most ``limit`` jobs, newest first, from the cursor of the page before.
+
+        Raises
+        ------
+        InvalidCursor
+            If no page gave out such a cursor.
+        """
+        page = await asyncio.to_thread(self._store.page, limit, cursor)
+        return replace(page, jobs=tuple(self._dispatcher.newest(job) for job in page.jobs))
+
+    async def artifact(self, job_id: str) -> bytes | None:
+        """Return the bytes that a job's work left; None if it left none.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        return await asyncio.to_thread(self._store.artifact, job_id)
+
+    async def cancel(self, job_id: str) -> Job:
+        """Cancel a job and return it as it is now; nothing happens to a finished one.
+
+        A waiting job is cancelled at once. A running one is asked to stop, and is cancelled with the best it
+        has found; if it does not react it is killed after the grace, and its last progress stays.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        Draining
+            If the service has stopped.
+        """
+        return await self._dispatcher.cancel(job_id)
+
+    async def wait(self, job_id: str, timeout_s: float | None) -> Job:
+        """Wait until a job is finished, for ``timeout_s`` at most (None: for ever), and return it.
+
+        Returns
+        -------
+        Job
+            Unfinished if the time ran out or the service stopped.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        end = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            channel = self._channels.find(job_id)
+            if channel is None or (channel.ended is None and not self._dispatcher.runs(job_id)):
+                job = await self.get(job_id)
+                if job.status.finished:
+                    return job
+                channel = self._channels.open(job_id)
+            bell = channel.changed
+            if channel.ended is not None:
+                return channel.ended
+            left = _LOOK_AGAIN_S if end is None else min(_LOOK_AGAIN_S, end - time.monotonic())
+            if left <= 0 or self._stopped:
+                return await self.get(job_id)
+            await rung(bell, left)
+
+    async def events(self, job_id: str, after: int = 0) -> AsyncIterator[JobEvent]:
+        """Yield a job's events with ids larger than ``after``: what is remembered, then what happens.
+
+        Ends after the ``"end"`` event, or when the service begins to stop.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        while True:
+            channel = self._channels.find(job_id)
+            if channel is None or (channel.ended is None and not self._dispatcher.runs(job_id)):
+                job = await self.get(job_id)
+                channel = self._channels.find(job_id)
+                if job.status.finished and (channel is None or channel.ended is None):
+                    for event in replay(job):
+                        if event.id > after:
+                            yield event
+                    return
+                channel = self._channels.open(job_id)
+            bell = channel.changed
+            ended = channel.ended is not None
+            for event in channel.since(after):
+                after = event.id
+                yield event
+            if ended or self._stopping:
+                return
+            await rung(bell, _LOOK_AGAIN_S)
+
+    def load(self) -> Load:
+        """Return how busy the service is; it answers quickly once a worker is ready."""
+        return self._dispatcher.load()

@@ -1,0 +1,396 @@
+"""The job table: every state a job takes is one transaction here, and nothing else knows the truth.
+
+A transition out of ``running`` names the attempt it belongs to and touches nothing if the job has gone on
+without it: a worker that was given up on cannot overwrite what came after it.
+
+The methods block on the disk (a commit is one fsync): call them from a thread, not from an event loop.
+"""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, RowMapping
+
+from app.jobs.errors import IdempotencyMismatch, InvalidCursor, QueueFull
+from app.jobs.failure import failure
+from app.jobs.model import Idempotency, Job, JobKind, JobPage, JobStatus, Lane, Progress, WorkResult
+from app.jobs.tables import artifacts, idempotency_keys, jobs
+from app.jobs.transitions import (
+    end,
+    find,
+    find_attempt,
+    job_of,
+    progress_of,
+    queued_of_other_kinds,
+    requeue,
+    select_jobs,
+)
+
+MIGRATIONS = Path(__file__).parent / "migrations"
+VERSION_TABLE = "alembic_version_jobs"
+
+OnSuccess = Callable[[Connection, Job, WorkResult], dict[str, Any]]
+
+
+class Database(Protocol):
+    """What the jobs room needs of a database; transactions that write take turns."""
+
+    def write(self) -> AbstractContextManager[Connection]:
+        """Open a write transaction, committed at its end and rolled back by an exception."""
+
+    def read(self) -> AbstractContextManager[Connection]:
+        """Open a read transaction."""
+
+    def migrate(self, script_location: Path, version_table: str) -> None:
+        """Bring the tables of an Alembic folder to its newest version."""
+
+
+@dataclass(frozen=True, slots=True)
+class QueueLimit:
+    """How many jobs of a lane may wait, and what to tell a caller for whom there is no place."""
+
+    places: int
+    retry_after_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A job that was taken to be run, and when its time is up (seconds since 1970)."""
+
+    job: Job
+    deadline: float | None
+
+
+class JobStore:
+    """Reads and writes the job table on behalf of one owner.
+
+    Parameters
+    ----------
+    database
+        Where the tables are.
+    owner
+        Recorded with every job that is taken, see :mod:`app.jobs.owner`.
+    max_attempts
+        How often a job may be lost with its worker or its owner; then it fails.
+    """
+
+    def __init__(self, database: Database, owner: str, max_attempts: int) -> None:
+        self._database = database
+        self._owner = owner
+        self._max_attempts = max_attempts
+
+    def migrate(self) -> None:
+        """Make the tables, or bring them to this version."""
+        self._database.migrate(MIGRATIONS, VERSION_TABLE)
+
+    def insert(
+        self,
+        kind: JobKind,
+        payload: dict[str, Any],
+        *,
+        run_now: bool,
+        limit: QueueLimit,
+        time_limit_s: float | None = None,
+        idempotency: Idempotency | None = None,
+    ) -> tuple[Claim, bool]:
+        """Add a job, or find the one that was added with the same idempotency key.
+
+        Parameters
+        ----------
+        run_now
+            A worker is reserved: the job begins as running, which saves the transaction that takes it.
+
+        Returns
+        -------
+        tuple
+            The job, and whether it is new.
+
+        Raises
+        ------
+        IdempotencyMismatch
+            If the key came with another body before.
+        QueueFull
+            If the job would have to wait and its lane has no place left.
+        """
+        now = time.time()
+        with self._database.write() as connection:
+            if idempotency is not None:
+                known = self._known(connection, idempotency)
+                if known is not None:
+                    return known, False
+            if not run_now:
+                waiting = connection.scalar(
+                    sa.select(sa.func.count()).where(
+                        jobs.c.status == JobStatus.QUEUED, jobs.c.lane == kind.lane
+                    )
+                )
+                if (waiting or 0) >= limit.places:
+                    raise QueueFull(kind.lane, limit.places, limit.retry_after_s)
+            row: dict[str, Any] = {
+                "id": uuid.uuid4().hex,
+                "kind": kind.name,
+                "lane": kind.lane,
+                "status": JobStatus.RUNNING if run_now else JobStatus.QUEUED,
+                "payload": payload,
+                "result": None,
+                "error": None,
+                "progress": Progress().as_json(),
+                "attempt": 1 if run_now else 0,
+                "losses": 0,
+                "owner": self._owner if run_now else None,
+                "cancel_requested": False,
+                "deadline": None if time_limit_s is None else now + time_limit_s,
+                "created_at": now,
+                "started_at": now if run_now else None,
+                "finished_at": None,
+            }
+            connection.execute(sa.insert(jobs).values(row))
+            if idempotency is not None:
+                connection.execute(
+                    sa.insert(idempotency_keys).values(
+                        client=idempotency.client,
+                        key=idempotency.key,
+                        body_hash=idempotency.body_hash,
+                        job_id=row["id"],
+                    )
+                )
+        return Claim(job_of({**row, "has_artifact": False}), row["deadline"]), True
+
+    def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
+        found = connection.execute(
+            sa.select(idempotency_keys.c.body_hash, idempotency_keys.c.job_id).where(
+                idempotency_keys.c.client == idempotency.client, idempotency_keys.c.key == idempotency.key
+            )
+        ).first()
+        if found is None:
+            return None
+        if found.body_hash != idempotency.body_hash:
+            raise IdempotencyMismatch(idempotency.key, found.job_id)
+        row = connection.execute(select_jobs.where(jobs.c.id == found.job_id)).mappings().one()
+        return Claim(job_of(row), row["deadline"])
+
+    def claim(self, lane: Lane) -> Claim | None:
+        """Take the job of a lane that has waited longest; None if none waits."""
+        oldest = (
+            sa.select(jobs.c.number)
+            .where(jobs.c.status == JobStatus.QUEUED, jobs.c.lane == lane)
+            .order_by(jobs.c.number)
+            .limit(1)
+            .scalar_subquery()
+        )
+        take = (
+            sa.update(jobs)
+            .where(jobs.c.number == oldest, jobs.c.status == JobStatus.QUEUED)
+            .values(
+                status=JobStatus.RUNNING,
+                attempt=jobs.c.attempt + 1,
+                owner=self._owner,
+                started_at=time.time(),
+            )
+            .returning(jobs)
+        )
+        with self._database.write() as connection:
+            row = connection.execute(take).mappings().first()
+        return None if row is None else Claim(job_of({**row, "has_artifact": False}), row["deadline"])
+
+    def succeed(
+        self, job_id: str, attempt: int, work: WorkResult, progress: Progress, on_success: OnSuccess | None
+    ) -> Job | None:
+        """Store what the work returned; the job has succeeded, or is cancelled if that was asked for.
+
+        Returns
+        -------
+        Job or None
+            None if the job has gone on without this attempt: nothing was stored, ``on_success`` not called.
+        """
+        with self._database.write() as connection:
+            row = find_attempt(connection, job_id, attempt)
+            if row is None:
+                return None
+            cancelled = row["cancel_requested"]
+            result = work.result
+            if on_success is not None and not cancelled:
+                result = on_success(connection, job_of(row), work)
+            if work.artifact is not None:
+                connection.execute(sa.insert(artifacts).values(job_id=job_id, data=work.artifact))
+            if cancelled:
+                return end(connection, row, JobStatus.CANCELLED, progress, result=result)
+            done = replace(progress, fraction=1.0)
+            return end(connection, row, JobStatus.SUCCEEDED, done, result=result)
+
+    def fail(self, job_id: str, attempt: int, error: dict[str, Any], progress: Progress) -> Job | None:
+        """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
+        with self._database.write() as connection:
+            row = find_attempt(connection, job_id, attempt)
+            if row is None:
+                return None
+            status = JobStatus.CANCELLED if row["cancel_requested"] else JobStatus.FAILED
+            return end(connection, row, status, progress, error=error)
+
+    def lose(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
+        """Give a job back whose worker died: it waits again, or has failed if that was the last attempt.
+
+        A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
+        """
+        with self._database.write() as connection:
+            row = find_attempt(connection, job_id, attempt)
+            return None if row is None else self._lose(connection, row, reason, progress)
+
+    def release(self, job_id: str, attempt: int, progress: Progress) -> Job | None:
+        """Put a job back into the queue that was stopped through no fault of its own."""
+        with self._database.write() as connection:
+            row = find_attempt(connection, job_id, attempt)
+            if row is None:
+                return None
+            if row["cancel_requested"]:
+                return end(connection, row, JobStatus.CANCELLED, progress)
+            return requeue(connection, row, row["losses"], progress)
+
+    def _lose(self, connection: Connection, row: RowMapping, reason: str, progress: Progress) -> Job:
+        if row["cancel_requested"]:
+            return end(connection, row, JobStatus.CANCELLED, progress)
+        losses = row["losses"] + 1
+        if losses >= self._max_attempts:
+            error = failure("worker-lost", f"{reason}; given up after {losses} attempts")
+            return end(connection, row, JobStatus.FAILED, progress, error=error)
+        return requeue(connection, row, losses, progress)
+
+    def recover(self, kinds: Iterable[str], alive: Callable[[str], bool]) -> list[Job]:
+        """Give back the running jobs of owners that are dead, and fail jobs of kinds that are no more.
+
+        Returns
+        -------
+        list of Job
+            Every job that was changed.
+        """
+        changed = []
+        with self._database.read() as connection:
+            owners = connection.scalars(
+                sa.select(jobs.c.owner).where(jobs.c.status == JobStatus.RUNNING).distinct()
+            ).all()
+            strangers = connection.scalar(queued_of_other_kinds(kinds).with_only_columns(sa.func.count()))
+        dead = [owner for owner in owners if not alive(owner)]
+        if not dead and not strangers:
+            return []
+        with self._database.write() as connection:
+            lost = select_jobs.where(jobs.c.status == JobStatus.RUNNING, jobs.c.owner.in_(dead))
+            for row in connection.execute(lost).mappings().all():
+                changed.append(
+                    self._lose(connection, row, "the service stopped in its midst", progress_of(row))
+                )
+            for row in connection.execute(queued_of_other_kinds(kinds)).mappings().all():
+                error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
+                changed.append(end(connection, row, JobStatus.FAILED, progress_of(row), error=error))
+        return changed
+
+    def save_progress(self, items: Iterable[tuple[str, int, Progress]]) -> None:
+        """Store the newest progress of running jobs, given as id, attempt and progress."""
+        with self._database.write() as connection:
+            for job_id, attempt, progress in items:
+                connection.execute(
+                    sa.update(jobs)
+                    .where(
+                        jobs.c.id == job_id,
+                        jobs.c.attempt == attempt,
+                        jobs.c.status == JobStatus.RUNNING,
+                    )
+                    .values(progress=progress.as_json())
+                )
+
+    def cancel(self, job_id: str) -> tuple[Job, JobStatus]:
+        """Cancel a waiting job, note for a running one that it should stop, and leave a finished one alone.
+
+        Returns
+        -------
+        tuple
+            The job as it is now, and the status it had before.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self._database.write() as connection:
+            row = find(connection, job_id)
+            if row["status"] == JobStatus.QUEUED:
+                return end(connection, row, JobStatus.CANCELLED, progress_of(row)), JobStatus.QUEUED
+            if row["status"] == JobStatus.RUNNING:
+                connection.execute(
+                    sa.update(jobs).where(jobs.c.number == row["number"]).values(cancel_requested=True)
+                )
+            job = job_of(row)
+        return job, job.status
+
+    def get(self, job_id: str) -> Job:
+        """Return a job.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self._database.read() as connection:
+            return job_of(find(connection, job_id))
+
+    def page(self, limit: int, cursor: str | None) -> JobPage:
+        """Return jobs, newest first, after the cursor; new jobs do not shift the pages that follow.
+
+        Raises
+        ------
+        InvalidCursor
+            If no page gave out such a cursor.
+        """
+        statement = select_jobs.order_by(jobs.c.number.desc()).limit(limit + 1)
+        if cursor is not None:
+            if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
+                raise InvalidCursor(cursor)
+            statement = statement.where(jobs.c.number < int(cursor))
+        with self._database.read() as connection:
+            rows = connection.execute(statement).mappings().all()
+        more = len(rows) > limit
+        rows = rows[:limit]
+        return JobPage(tuple(job_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
+
+    def artifact(self, job_id: str) -> bytes | None:
+        """Return the bytes that a job left behind; None if it left none.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self._database.read() as connection:
+            find(connection, job_id)
+            data: bytes | None = connection.scalar(
+                sa.select(artifacts.c.data).where(artifacts.c.job_id == job_id)
+            )
+            return data
+
+    def waiting(self) -> dict[Lane, int]:
+        """Return how many jobs wait in each lane that has any."""
+        with self._database.read() as connection:
+            rows = connection.execute(
+                sa.select(jobs.c.lane, sa.func.count().label("jobs"))
+                .where(jobs.c.status == JobStatus.QUEUED)
+                .group_by(jobs.c.lane)
+            )
+            return {row.lane: row.jobs for row in rows}
+
+    def recent_durations(self, lane: Lane, limit: int) -> list[float]:
+        """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
+        with self._database.read() as connection:
+            rows = connection.execute(
+                sa.select(jobs.c.finished_at - jobs.c.started_at)
+                .where(jobs.c.status == JobStatus.SUCCEEDED, jobs.c.lane == lane)
+                .order_by(jobs.c.number.desc())
+                .limit(limit)
+            )
+            return [float(seconds) for (seconds,) in rows][::-1]

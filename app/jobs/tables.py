@@ -1,0 +1,54 @@
+"""The tables of the jobs room, as the newest migration leaves them.
+
+Times are seconds since 1970 UTC: they are compared and subtracted, and the sort is the same in every
+database. ``jobs.number`` counts submissions: it is the order of the queue and of the pages.
+"""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+metadata = sa.MetaData()
+
+jobs = sa.Table(
+    "jobs",
+    metadata,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("id", sa.String(32), nullable=False, unique=True),
+    sa.Column("kind", sa.String(64), nullable=False),
+    sa.Column("lane", sa.String(16), nullable=False),
+    sa.Column("status", sa.String(16), nullable=False),
+    sa.Column("payload", sa.JSON, nullable=False),
+    sa.Column("result", sa.JSON(none_as_null=True)),
+    sa.Column("error", sa.JSON(none_as_null=True)),
+    sa.Column("progress", sa.JSON, nullable=False),
+    sa.Column("attempt", sa.Integer, nullable=False),
+    # Attempts that ended because the worker or its owner died. A clean stop of the service is not one.
+    sa.Column("losses", sa.Integer, nullable=False),
+    sa.Column("owner", sa.String(255)),
+    sa.Column("cancel_requested", sa.Boolean, nullable=False),
+    sa.Column("deadline", sa.Double),
+    sa.Column("created_at", sa.Double, nullable=False),
+    sa.Column("started_at", sa.Double),
+    sa.Column("finished_at", sa.Double),
+    sa.Index("ix_jobs_status_lane_number", "status", "lane", "number"),
+    sqlite_autoincrement=True,
+)
+
+artifacts = sa.Table(
+    "job_artifacts",
+    metadata,
+    sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("data", sa.LargeBinary, nullable=False),
+)
+
+idempotency_keys = sa.Table(
+    "job_idempotency_keys",
+    metadata,
+    sa.Column("client", sa.String(255), primary_key=True),
+    sa.Column("key", sa.String(255), primary_key=True),
+    sa.Column("body_hash", sa.String(128), nullable=False),
+    sa.Column(
+        "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False, index=True
+    ),
+)

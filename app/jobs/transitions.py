@@ -1,0 +1,113 @@
+"""Rows of the job table and the ways from one state to the next, inside the caller's transaction."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, RowMapping
+
+from app.jobs.errors import JobNotFound
+from app.jobs.model import Job, JobStatus, Progress
+from app.jobs.tables import artifacts, jobs
+
+has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).correlate(jobs).label("has_artifact")
+select_jobs = sa.select(jobs, has_artifact)
+
+
+def find(connection: Connection, job_id: str) -> RowMapping:
+    """Return the row of a job.
+
+    Raises
+    ------
+    JobNotFound
+        If no job has that id.
+    """
+    row = connection.execute(select_jobs.where(jobs.c.id == job_id)).mappings().first()
+    if row is None:
+        raise JobNotFound(job_id)
+    return row
+
+
+def find_attempt(connection: Connection, job_id: str, attempt: int) -> RowMapping | None:
+    """Return the row if the job is still in this attempt; nothing can come between it and the commit."""
+    return (
+        connection.execute(
+            select_jobs.where(
+                jobs.c.id == job_id, jobs.c.attempt == attempt, jobs.c.status == JobStatus.RUNNING
+            )
+        )
+        .mappings()
+        .first()
+    )
+
+
+def queued_of_other_kinds(kinds: Iterable[str]) -> sa.Select[Any]:
+    """Select the waiting jobs that none of these kinds can run."""
+    return select_jobs.where(jobs.c.status == JobStatus.QUEUED, jobs.c.kind.not_in(list(kinds)))
+
+
+def end(
+    connection: Connection,
+    row: RowMapping,
+    status: JobStatus,
+    progress: Progress,
+    *,
+    result: dict[str, Any] | None = None,
+    error: dict[str, Any] | None = None,
+) -> Job:
+    """Move a job to a final state."""
+    return change(connection, row, status, progress, result=result, error=error, finished_at=time.time())
+
+
+def requeue(connection: Connection, row: RowMapping, losses: int, progress: Progress) -> Job:
+    """Let a job wait again, in the place of the queue that its number gives it."""
+    return change(connection, row, JobStatus.QUEUED, progress, losses=losses, owner=None, started_at=None)
+
+
+def change(
+    connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
+) -> Job:
+    """Move a job on from the state, and the attempt, in which it was read."""
+    changed = (
+        connection.execute(
+            sa.update(jobs)
+            .where(jobs.c.id == row["id"], jobs.c.attempt == row["attempt"], jobs.c.status == row["status"])
+            .values(status=status, progress=progress.as_json(), **values)
+            .returning(jobs, has_artifact)
+        )
+        .mappings()
+        .one()
+    )
+    return job_of(changed)
+
+
+def progress_of(row: RowMapping | dict[str, Any]) -> Progress:
+    """Return the stored progress of a row."""
+    return Progress(**row["progress"])
+
+
+def _time(seconds: float | None) -> datetime | None:
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC)
+
+
+def job_of(row: RowMapping | dict[str, Any]) -> Job:
+    """Return the job that a row with ``has_artifact`` describes."""
+    return Job(
+        id=row["id"],
+        kind=row["kind"],
+        status=JobStatus(row["status"]),
+        lane=row["lane"],
+        payload=row["payload"],
+        result=row["result"],
+        error=row["error"],
+        progress=progress_of(row),
+        attempt=row["attempt"],
+        created_at=datetime.fromtimestamp(row["created_at"], UTC),
+        started_at=_time(row["started_at"]),
+        finished_at=_time(row["finished_at"]),
+        has_artifact=bool(row["has_artifact"]),
+    )

@@ -1,0 +1,60 @@
+"""What a work function can do while it works: report progress, and see that it should stop."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, MutableSequence
+
+from app.jobs.model import Progress
+
+CANCEL, DEADLINE = 0, 1
+
+
+def new_control() -> list[float]:
+    """Return a control block that nobody else sees: not cancelled, no deadline."""
+    return [0.0, math.inf]
+
+
+class WorkContext:
+    """Handed to a work function beside its payload.
+
+    A work function polls :meth:`cancelled` and :meth:`time_left` between short pieces of work, and returns
+    the best it has as soon as one of them says stop. One that goes on regardless is killed.
+
+    Parameters
+    ----------
+    report
+        Called with every progress. It must be quick, the worker's own only takes a note.
+    control
+        Two numbers that another process may change while the work runs: non-zero once the job is cancelled,
+        and the deadline on the monotonic clock, which all processes of a machine share (infinite for none).
+        Asking reads shared memory and takes well under a microsecond.
+    """
+
+    def __init__(
+        self, report: Callable[[Progress], None], control: MutableSequence[float] | None = None
+    ) -> None:
+        self._report = report
+        self._control = new_control() if control is None else control
+
+    @classmethod
+    def in_process(cls, report: Callable[[Progress], None], time_limit_s: float | None = None) -> WorkContext:
+        """Return the context of work that is done by this process, without a job."""
+        control = new_control()
+        if time_limit_s is not None:
+            control[DEADLINE] = time.monotonic() + time_limit_s
+        return cls(report, control)
+
+    def report(self, progress: Progress) -> None:
+        """Tell how far the work is; may be called as often as there is news."""
+        self._report(progress)
+
+    def cancelled(self) -> bool:
+        """Say whether somebody asked the work to stop."""
+        return self._control[CANCEL] != 0.0
+
+    def time_left(self) -> float | None:
+        """Return the seconds that are left, zero or less when time is up; None without a time limit."""
+        deadline = self._control[DEADLINE]
+        return None if math.isinf(deadline) else deadline - time.monotonic()

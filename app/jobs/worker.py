@@ -1,0 +1,160 @@
+"""The worker's side: what runs in a process that the local executor has started.
+
+Nothing here imports SQLAlchemy, numpy, numba or torch: what the work needs comes with the work function.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import multiprocessing
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable, MutableSequence
+from dataclasses import dataclass, replace
+from functools import cache
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from app.jobs.executor import Raised, Returned
+from app.jobs.failure import describe
+from app.jobs.model import Progress
+from app.jobs.work_context import WorkContext
+
+REPORT_INTERVAL_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a piece of work ended, and its last progress, which may not have gone through the pipe."""
+
+    outcome: Returned | Raised
+    progress: Progress | None
+
+
+class _Reporter:
+    """Sends the newest progress through the pipe, at most one every ``REPORT_INTERVAL_S``.
+
+    The sending is a thread's, so that the work never waits for the reader, and so that the newest progress
+    goes out in time even if the work reports nothing after it for long.
+    """
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._lock = threading.Lock()
+        self._news = threading.Event()
+        self._serial = 0
+        self._latest: Progress | None = None
+        self._unsent: Progress | None = None
+        threading.Thread(target=self._send, name="progress", daemon=True).start()
+
+    def begin(self, serial: int) -> None:
+        with self._lock:
+            self._serial = serial
+            self._latest = self._unsent = None
+
+    def report(self, progress: Progress) -> None:
+        with self._lock:
+            self._latest = self._unsent = progress
+        self._news.set()
+
+    def end(self) -> Progress | None:
+        """Stop reporting the work that ends, and return its last progress."""
+        with self._lock:
+            self._unsent = None
+            return None if self._latest is None else _clean(self._latest)
+
+    def _send(self) -> None:
+        while True:
+            self._news.wait()
+            self._news.clear()
+            with self._lock:
+                serial, progress = self._serial, self._unsent
+                self._unsent = None
+            if progress is None:
+                continue
+            try:
+                self._pipe.send((serial, _clean(progress)))
+            except OSError:
+                return
+            time.sleep(REPORT_INTERVAL_S)
+
+
+def _clean(progress: Progress) -> Progress:
+    """Return a progress of plain JSON numbers: a reward may be minus infinity until a plan is found."""
+    reward = progress.best_reward
+    plan = progress.assignment
+    return replace(
+        progress,
+        fraction=min(1.0, max(0.0, float(progress.fraction))),
+        epoch=None if progress.epoch is None else int(progress.epoch),
+        best_reward=None if reward is None or not math.isfinite(reward) else float(reward),
+        assignment=None if plan is None else [[int(action) for action in row] for row in plan],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Equipment:
+    reporter: _Reporter
+    control: MutableSequence[float]
+
+
+# A pool's initializer can hand over to its calls only through the module; a worker has exactly one.
+_equipment: list[_Equipment] = []
+
+
+def initialize(pipe: Connection, control: MutableSequence[float]) -> None:
+    """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
+
+    Parameters
+    ----------
+    pipe
+        Where progress goes, as pairs of serial number and :class:`Progress`.
+    control
+        Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_die_with_parent, name="parent-watch", daemon=True).start()
+    _equipment.append(_Equipment(_Reporter(pipe), control))
+
+
+def _die_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        # No clean-up: what this process would write on its way out, nobody is there to read.
+        os._exit(1)
+
+
+def warm_up(hook: str | None) -> int:
+    """Run the hook that makes the first piece of work as quick as the later ones; return the process id."""
+    if hook is not None:
+        resolve(hook)()
+    return os.getpid()
+
+
+def run(serial: int, work: str, payload: dict[str, Any]) -> Ended:
+    """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it."""
+    reporter, control = _equipment[0].reporter, _equipment[0].control
+    reporter.begin(serial)
+    outcome: Returned | Raised
+    try:
+        result = resolve(work)(payload, WorkContext(reporter.report, control))
+        # A result that is no JSON must fail here, with a traceback, and not when it is stored.
+        json.dumps(result.result, allow_nan=False)
+        outcome = Returned(result)
+    except BaseException as error:
+        outcome = Raised(describe(error), traceback.format_exc())
+    return Ended(outcome, reporter.end())
+
+
+@cache
+def resolve(dotted: str) -> Callable[..., Any]:
+    """Return what ``"module:attribute"`` names."""
+    module, _, name = dotted.partition(":")
+    found: Callable[..., Any] = getattr(importlib.import_module(module), name)
+    return found
