@@ -1,0 +1,154 @@
+"""Simulated annealing over plans."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import compiled
+from app.solvers.local_search.change import Change, apply, extra_distance, feasible, new_change, propose, undo
+from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
+from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
+
+
+class Search(NamedTuple):
+    """One search: its problem, its current plan, its incumbent.
+
+    Attributes
+    ----------
+    arrays
+        A stack of one problem.
+    near, routes, change
+        What the moves draw from, the current plan, scratch space.
+    best_target, best_length
+        (M, S) and (M,) the routes of the incumbent.
+    best
+        (1,) its reward.
+    """
+
+    arrays: ProblemArrays
+    near: Neighbourhood
+    routes: Routes
+    change: Change
+    best_target: Integers
+    best_length: Integers
+    best: Floats
+
+
+def new_search(arrays: ProblemArrays) -> Search:
+    """Begin a search from the plan in which nobody flies."""
+    routes = empty_routes(arrays)
+    search = Search(
+        arrays,
+        neighbourhood(arrays),
+        routes,
+        new_change(arrays),
+        routes.target.copy(),
+        routes.length.copy(),
+        np.zeros(1),
+    )
+    if arrays.charge_return[0]:
+        at_home = arrays.start_home[0][~arrays.ret[0]]
+        routes.total[DISTANCE] = at_home.sum()
+    search.best[0] = -arrays.weight[0] * routes.total[DISTANCE]
+    return search
+
+
+def set_routes(search: Search, actions: Integers) -> None:
+    """Replace the current plan.
+
+    Parameters
+    ----------
+    search
+        The search.
+    actions
+        (S', M) joint actions of a legal plan.
+    """
+    home = search.arrays.level.shape[1]
+    for i in range(actions.shape[1]):
+        targets = actions[:, i]
+        set_route(search, i, np.ascontiguousarray(targets[targets < home]))
+    keep_best(search)
+
+
+def actions_of(search: Search) -> Integers:
+    """Return the incumbent as joint actions, (S, M)."""
+    steps = search.best_target.shape[1]
+    home = search.arrays.level.shape[1]
+    used = np.arange(steps)[None, :] < search.best_length[:, None]
+    return np.where(used, search.best_target, home).T.copy()
+
+
+@compiled
+def set_route(search: Search, i: int, targets: Integers) -> None:
+    """Give UAV `i` a route that range and deadlines allow."""
+    change = search.change
+    change.uav[1] = NONE
+    for s in range(len(targets)):
+        change.target[0, s] = targets[s]
+    propose(search.routes, change, 0, i, 0, len(targets))
+    if feasible(search.arrays, change):
+        apply(search.arrays, search.routes, change, extra_distance(search.arrays, search.routes, change))
+
+
+@compiled
+def keep_best(search: Search) -> bool:
+    """Make the current plan the incumbent if it is legal and better."""
+    routes = search.routes
+    reward = routes.total[SATISFACTION] - search.arrays.weight[0] * routes.total[DISTANCE]
+    if routes.total[USELESS] > 0.5 or reward <= search.best[0] + 1e-12:
+        return False
+    search.best[0] = reward
+    for i in range(routes.length.shape[0]):
+        search.best_length[i] = routes.length[i]
+        for s in range(routes.length[i]):
+            search.best_target[i, s] = routes.target[i, s]
+    return True
+
+
+@compiled
+def anneal(
+    search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float
+) -> int:
+    """Try moves while the temperature falls geometrically from `hot` to `cold`; return how many were kept.
+
+    Parameters
+    ----------
+    search
+        Changed: its current plan, and its incumbent where a better one is found.
+    rng
+        The only source of randomness.
+    moves
+        How many to try.
+    hot, cold
+        Temperatures, in reward.
+    penalty
+        What a visit that unloads nothing costs during the search, in reward; more than 0, so that it goes.
+    """
+    arrays, routes, change = search.arrays, search.routes, search.change
+    weight = arrays.weight[0]
+    kept = 0
+    temperature = hot
+    cooling = math.exp(math.log(cold / hot) / max(moves, 1))
+    for _ in range(moves):
+        temperature *= cooling
+        if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
+            continue
+        extra = extra_distance(arrays, routes, change)
+        apply(arrays, routes, change, extra)
+        gain = (
+            routes.total[SATISFACTION]
+            - change.total[SATISFACTION]
+            - weight * extra
+            - penalty * (routes.total[USELESS] - change.total[USELESS])
+        )
+        if gain >= 0.0 or rng.random() < math.exp(gain / temperature):
+            kept += 1
+            if gain > 0.0:
+                keep_best(search)
+        else:
+            undo(routes, change)
+    return kept

@@ -1,0 +1,229 @@
+"""The moves: each proposes new routes for one or two UAVs, drawn at random near what it starts from.
+
+Targets to fly to are drawn from lists of near targets, so that the cost of a move does not grow with N.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.simulation.arrays import Integers, ProblemArrays
+from app.simulation.simulator import compiled
+from app.solvers.local_search.change import Change, propose
+from app.solvers.local_search.routes import NONE, Routes
+
+NEAR = 24
+"""Length of the lists of near targets."""
+
+FAR_SHARE = 0.05
+"""Probability that a target is drawn from all of them instead."""
+
+
+class Neighbourhood(NamedTuple):
+    """What the moves draw from.
+
+    Attributes
+    ----------
+    active
+        UAVs that may be sent, (A,).
+    wanted
+        Targets that need anything, (W,).
+    near_target
+        (N, L) the targets nearest to a target, itself left out.
+    near_start
+        (M, L) the targets nearest to where a UAV is.
+    """
+
+    active: Integers
+    wanted: Integers
+    near_target: Integers
+    near_start: Integers
+
+
+def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
+    """Make the lists for the first problem of a stack; ``active`` or ``wanted`` may be empty."""
+    wanted = np.flatnonzero(arrays.need_total[0] > 0)
+    length = max(1, min(NEAR, len(wanted) - 1))
+    between = arrays.between[0].copy()
+    np.fill_diagonal(between, np.inf)
+    return Neighbourhood(
+        active=np.flatnonzero(~arrays.ret[0] & (arrays.load[0] > 0).any(axis=1)),
+        wanted=wanted,
+        near_target=_nearest(between, wanted, length),
+        near_start=_nearest(arrays.start_target[0], wanted, length),
+    )
+
+
+def _nearest(distance: np.ndarray, wanted: Integers, length: int) -> Integers:
+    """(rows, length) wanted columns of least distance, least first."""
+    if not len(wanted):
+        return np.zeros((len(distance), 1), np.int64)
+    among = distance[:, wanted]
+    if length < among.shape[1]:
+        part = np.argpartition(among, length - 1, axis=1)[:, :length]
+    else:
+        part = np.broadcast_to(np.arange(among.shape[1]), among.shape)
+    order = np.argsort(np.take_along_axis(among, part, axis=1), axis=1, kind="stable")
+    return np.ascontiguousarray(wanted[np.take_along_axis(part, order, axis=1)])
+
+
+@compiled
+def draw(rng: np.random.Generator, n: int) -> int:
+    """Draw a number from 0..n-1."""
+    return int(rng.random() * n)
+
+
+@compiled
+def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator) -> bool:
+    """Propose a random move; False where what was drawn is not possible."""
+    change.uav[0], change.uav[1] = NONE, NONE
+    i = near.active[draw(rng, len(near.active))]
+    kind = rng.random()
+    if routes.length[i] == 0 or kind < 0.15:
+        return _insert(routes, near, change, rng, i)
+    if kind < 0.25:
+        return _remove(routes, change, rng, i)
+    if kind < 0.45:
+        return _replace(routes, near, change, rng, i)
+    if kind < 0.52:
+        return _reverse(routes, change, rng, i)
+    other = _near_visit(routes, near, rng, i)
+    if other == NONE:
+        return False
+    m = routes.length.shape[0]
+    i2, s2 = other % m, other // m
+    if kind < 0.70:
+        return _relocate(routes, change, rng, i, i2, s2)
+    if kind < 0.85:
+        return _swap(routes, change, rng, i, i2, s2)
+    return _swap_tails(routes, change, rng, i, i2, s2)
+
+
+@compiled
+def _target_after(routes: Routes, near: Neighbourhood, rng: np.random.Generator, i: int, s: int) -> int:
+    """Draw a target to fly to after the first `s` visits of UAV `i`; nearer ones more often."""
+    if rng.random() < FAR_SHARE:
+        return near.wanted[draw(rng, len(near.wanted))]
+    u = rng.random()
+    if s == 0:
+        return near.near_start[i, int(u * u * near.near_start.shape[1])]
+    return near.near_target[routes.target[i, s - 1], int(u * u * near.near_target.shape[1])]
+
+
+@compiled
+def _near_visit(routes: Routes, near: Neighbourhood, rng: np.random.Generator, i: int) -> int:
+    """Draw a visit of another UAV near a visit of UAV `i`, as its slot; NONE where there is none."""
+    j = _target_after(routes, near, rng, i, draw(rng, routes.length[i] + 1))
+    slot = routes.first[j]
+    if slot == NONE:
+        return NONE
+    while routes.following[slot] != NONE and rng.random() < 0.5:
+        slot = routes.following[slot]
+    return slot if slot % routes.length.shape[0] != i else NONE
+
+
+@compiled
+def _insert(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """One more visit, anywhere in the route; a full route loses its last one."""
+    length, steps = routes.length[i], routes.target.shape[1]
+    s = draw(rng, min(length + 1, steps))
+    new = min(length + 1, steps)
+    change.target[0, s] = _target_after(routes, near, rng, i, s)
+    for q in range(s + 1, new):
+        change.target[0, q] = routes.target[i, q - 1]
+    propose(routes, change, 0, i, s, new)
+    return True
+
+
+@compiled
+def _remove(routes: Routes, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """One visit less."""
+    length = routes.length[i]
+    s = draw(rng, length)
+    for q in range(s, length - 1):
+        change.target[0, q] = routes.target[i, q + 1]
+    propose(routes, change, 0, i, s, length - 1)
+    return True
+
+
+@compiled
+def _replace(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """Another target in place of one; near the one before it, or near the one it replaces."""
+    length = routes.length[i]
+    s = draw(rng, length)
+    change.target[0, s] = _target_after(routes, near, rng, i, s if rng.random() < 0.5 else s + 1)
+    if change.target[0, s] == routes.target[i, s]:
+        return False
+    for q in range(s + 1, length):
+        change.target[0, q] = routes.target[i, q]
+    propose(routes, change, 0, i, s, length)
+    return True
+
+
+@compiled
+def _reverse(routes: Routes, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """A stretch of the route the other way round."""
+    length = routes.length[i]
+    if length < 2:
+        return False
+    a, b = draw(rng, length), draw(rng, length)
+    a, b = min(a, b), max(a, b)
+    if a == b:
+        return False
+    for q in range(a, length):
+        change.target[0, q] = routes.target[i, a + b - q if q <= b else q]
+    propose(routes, change, 0, i, a, length)
+    return True
+
+
+@compiled
+def _relocate(routes: Routes, change: Change, rng: np.random.Generator, i: int, i2: int, s2: int) -> bool:
+    """A visit of UAV `i` moves to UAV `i2`, before or after its visit `s2`."""
+    steps = routes.target.shape[1]
+    if routes.length[i2] >= steps:
+        return False
+    length, length2 = routes.length[i], routes.length[i2]
+    s, into = draw(rng, length), s2 + draw(rng, 2)
+    for q in range(s, length - 1):
+        change.target[0, q] = routes.target[i, q + 1]
+    change.target[1, into] = routes.target[i, s]
+    for q in range(into + 1, length2 + 1):
+        change.target[1, q] = routes.target[i2, q - 1]
+    propose(routes, change, 0, i, s, length - 1)
+    propose(routes, change, 1, i2, into, length2 + 1)
+    return True
+
+
+@compiled
+def _swap(routes: Routes, change: Change, rng: np.random.Generator, i: int, i2: int, s2: int) -> bool:
+    """A visit of UAV `i` and visit `s2` of UAV `i2` change places."""
+    s = draw(rng, routes.length[i])
+    if routes.target[i, s] == routes.target[i2, s2]:
+        return False
+    change.target[0, s], change.target[1, s2] = routes.target[i2, s2], routes.target[i, s]
+    for q in range(s + 1, routes.length[i]):
+        change.target[0, q] = routes.target[i, q]
+    for q in range(s2 + 1, routes.length[i2]):
+        change.target[1, q] = routes.target[i2, q]
+    propose(routes, change, 0, i, s, routes.length[i])
+    propose(routes, change, 1, i2, s2, routes.length[i2])
+    return True
+
+
+@compiled
+def _swap_tails(routes: Routes, change: Change, rng: np.random.Generator, i: int, i2: int, s2: int) -> bool:
+    """What UAV `i` does from a visit on, and UAV `i2` from visit `s2` on, change places."""
+    steps = routes.target.shape[1]
+    s = draw(rng, routes.length[i] + 1)
+    tail, tail2 = routes.length[i] - s, routes.length[i2] - s2
+    if s + tail2 > steps or s2 + tail > steps:
+        return False
+    for q in range(tail2):
+        change.target[0, s + q] = routes.target[i2, s2 + q]
+    for q in range(tail):
+        change.target[1, s2 + q] = routes.target[i, s + q]
+    propose(routes, change, 0, i, s, s + tail2)
+    propose(routes, change, 1, i2, s2, s2 + tail)
+    return True
