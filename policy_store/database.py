@@ -44,7 +44,8 @@ class _WriterLock:
 
 _registry_lock = threading.Lock()
 _writer_locks: dict[str, _WriterLock] = {}
-# Alembic hands the migration environment over in module globals: one migration in the process at a time.
+# Alembic hands its environment over in module globals. Two threads that migrate different databases would run
+# statements on each other's connection, which ends in a segmentation fault.
 _migration_lock = threading.Lock()
 
 

@@ -1,10 +1,12 @@
 import json
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import textwrap
 import threading
+import types
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -66,6 +68,8 @@ def test_no_update_is_lost_between_two_objects_and_two_processes(counter: Databa
         from sqlalchemy import text
         from policy_store.database import Database
         database = Database(sys.argv[1])
+        print("ready", flush=True)
+        sys.stdin.readline()
         for _ in range(25):
             with database.write() as connection:
                 value = connection.execute(text("SELECT value FROM counter")).scalar_one()
@@ -73,12 +77,23 @@ def test_no_update_is_lost_between_two_objects_and_two_processes(counter: Databa
     """
     other = Database(url)
     process = start(program, url)
-    with ThreadPoolExecutor(2) as threads:
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    with ThreadPoolExecutor(3) as threads:
+        process_done = threads.submit(process.communicate, "go\n", timeout=60)
         for done in [threads.submit(increment, each, 25) for each in (counter, other)]:
             done.result()
-    assert process.communicate(timeout=60)[1] == ""
+        assert process_done.result()[1] == ""
     assert scalar(counter, "SELECT value FROM counter") == 75
     other.dispose()
+
+
+def test_a_write_keeps_other_processes_out_from_its_beginning(counter: Database, url: str) -> None:
+    outsider = sqlite3.connect(url.removeprefix("sqlite:///"), timeout=0, isolation_level=None)
+    with counter.write(), pytest.raises(sqlite3.OperationalError, match="locked"):
+        outsider.execute("BEGIN IMMEDIATE")
+    outsider.execute("BEGIN IMMEDIATE")
+    outsider.close()
 
 
 def test_an_exception_rolls_the_transaction_back(counter: Database) -> None:
@@ -215,8 +230,9 @@ def test_processes_that_migrate_at_once_all_succeed(url: str) -> None:
     assert [process.communicate(timeout=60) for process in processes] == [("0\n", "")] * 3
 
 
-def test_threads_that_migrate_at_once_all_succeed(url: str) -> None:
-    databases = [Database(url) for _ in range(6)]
+@pytest.mark.parametrize("files", [1, 6])
+def test_threads_that_migrate_at_once_all_succeed(tmp_path: Path, files: int) -> None:
+    databases = [Database(f"sqlite:///{tmp_path / str(number % files)}.db") for number in range(6)]
     barrier = threading.Barrier(len(databases))
 
     def migrate(database: Database) -> int:
@@ -244,6 +260,31 @@ def write_migrations(folder: Path, *bodies: str) -> Path:
             f"def upgrade():\n{textwrap.indent(textwrap.dedent(body), '    ')}\n"
         )
     return folder
+
+
+def test_migrations_of_two_databases_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alembic's environment is global in a process: a second migration would take the first one's."""
+    meeting = types.SimpleNamespace(
+        barrier=threading.Barrier(2), met=False, error=threading.BrokenBarrierError
+    )
+    monkeypatch.setitem(sys.modules, "meeting", meeting)
+    body = """
+        import meeting
+        try:
+            meeting.barrier.wait(0.3)
+            meeting.met = True
+        except meeting.error:
+            op.execute("CREATE TABLE a (x INTEGER)")
+    """
+    folder = write_migrations(tmp_path / "other", body)
+    databases = [Database(f"sqlite:///{tmp_path}/{number}.db") for number in range(2)]
+    with ThreadPoolExecutor(2) as threads:
+        for done in [threads.submit(each.migrate, folder, "version_other") for each in databases]:
+            done.result()
+    assert not meeting.met
+    for each in databases:
+        assert scalar(each, "SELECT count(*) FROM a") == 0
+        each.dispose()
 
 
 def test_a_migration_that_fails_leaves_everything_as_it_was(database: Database, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from policy_store.errors import (
 )
 from policy_store.library import PolicyLibrary
 from policy_store.tables import checkpoints, feature_vectors
+from policy_store.vector_cache import VectorCache
 
 SPACE = "task-description-1/5x10x3"
 
@@ -355,6 +356,26 @@ def test_look_ups_during_changes_see_one_state(library: PolicyLibrary, new_polic
         threads.submit(write).result()
         assert all(reader.result() >= 1 for reader in readers)
     assert len(library.nearest(SPACE, [0, 0], 1000)) == 2 * (25 - 9)
+
+
+def test_a_transaction_older_than_the_cache_sees_its_own_state(
+    library: PolicyLibrary, database: Database, new_policy
+) -> None:
+    cache = VectorCache()
+    first = library.add(new_policy(name="a", vectors={SPACE: [1, 0]}))
+    with database.read() as old:
+        old.execute(select(checkpoints.c.size)).all()  # its state is that of its first query
+        library.delete(first.id)
+        second = library.add(new_policy(name="b", vectors={SPACE: [2, 0]}))
+        with database.read() as new:
+            newer = cache.get(new, SPACE)
+        older = cache.get(old, SPACE)
+    assert newer is not None
+    assert older is not None
+    assert (newer.ids, newer.matrix.tolist()) == ((second.id,), [[2.0, 0.0]])
+    assert (older.ids, older.matrix.tolist()) == ((first.id,), [[1.0, 0.0]])
+    with database.read() as new:
+        assert cache.get(new, SPACE) is newer
 
 
 def test_a_long_list_of_neighbours(library: PolicyLibrary, database: Database, new_policy) -> None:
