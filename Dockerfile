@@ -1,0 +1,36 @@
+# The service in one image. PyTorch's default wheel for Linux carries gigabytes of CUDA libraries; the index of
+# CPU wheels is the default here and can be replaced, e.g. by a company's mirror:
+#   docker build --build-arg TORCH_INDEX=https://download.pytorch.org/whl/cpu -t uav-allocator .
+#   docker run --rm -p 8000:8000 -v allocator-data:/data uav-allocator
+FROM python:3.11-slim
+
+ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
+
+ENV PIP_NO_CACHE_DIR=1 \
+    PIP_DISABLE_PIP_VERSION_CHECK=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    PYTHONUNBUFFERED=1 \
+    NUMBA_CACHE_DIR=/srv/numba-cache \
+    ALLOCATOR_HOST=0.0.0.0 \
+    ALLOCATOR_DATA_DIR=/data
+
+WORKDIR /srv/allocator
+COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY app ./app
+COPY policy_store ./policy_store
+RUN pip install --index-url "$TORCH_INDEX" "$(grep '^torch==' constraints.txt)" \
+    && pip install --constraint constraints.txt .
+
+# The compiled code is made here, as the user that runs it, so that no first answer waits for a compiler.
+RUN useradd --create-home --uid 1000 allocator \
+    && mkdir -p /data /srv/numba-cache \
+    && chown allocator /data /srv/numba-cache
+USER allocator
+WORKDIR /data
+RUN python -m app allocate /srv/allocator/app/examples/paper-5x10.json --algorithm ga > /dev/null
+
+VOLUME /data
+EXPOSE 8000
+HEALTHCHECK --interval=10s --timeout=3s --start-period=60s \
+    CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8000/healthz', timeout=2)"]
+CMD ["python", "-m", "app", "serve"]

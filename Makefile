@@ -1,0 +1,45 @@
+# `make run` starts the service, `make test` passes every check; both do the whole set-up first.
+PORT ?= 8000
+HOST ?= 127.0.0.1
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: run test lint types borders unit bench constraints clean
+
+run: .venv/installed
+	$(BIN)/python -m app serve --host $(HOST) --port $(PORT)
+
+test: lint types borders unit
+
+lint: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: .venv/installed
+	$(BIN)/mypy
+
+borders: .venv/installed
+	$(BIN)/lint-imports
+
+unit: .venv/installed
+	$(BIN)/python -m pytest
+
+bench: .venv/installed
+	$(BIN)/python tests/benchmarks/bench_simulator.py
+	$(BIN)/python tests/benchmarks/bench_training.py
+
+# Pins everything, from a clean environment: run it after a change of the dependencies.
+constraints:
+	rm -rf .venv-constraints
+	$(PYTHON) -m venv .venv-constraints
+	.venv-constraints/bin/pip install --quiet ".[dev]"
+	.venv-constraints/bin/pip freeze --exclude uav-allocator --exclude pip --exclude setuptools | sed 's/+cpu$$//' > constraints.txt
+	rm -rf .venv-constraints
+
+.venv/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	touch $@
+
+clean:
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
