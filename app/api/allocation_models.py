@@ -1,0 +1,113 @@
+"""An allocation on the wire: what is asked, and what is answered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.api.problem_models import ProblemModel, WireModel
+
+MAX_SEED = 2**63 - 1
+MAX_TIME_LIMIT_S = 7 * 24 * 3600.0
+
+
+class TrainingModel(WireModel):
+    """What to learn with."""
+
+    algorithm: str = Field(default="qmix", description="An algorithm that learns, see `GET /algorithms`")
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="The algorithm's own; the others keep their defaults"
+    )
+    seed: int = Field(default=123, ge=0, le=MAX_SEED, description="Source of all randomness")
+
+
+class AllocationRequest(ProblemModel):
+    """A problem, and how to solve it."""
+
+    algorithm: str = Field(default="transfer_qmix", description="See `GET /algorithms`")
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="The algorithm's own; the others keep their defaults"
+    )
+    seed: int = Field(
+        default=123,
+        ge=0,
+        le=MAX_SEED,
+        description="Source of all randomness: same request, same seed, no time limit: same answer",
+    )
+    time_limit_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=MAX_TIME_LIMIT_S,
+        description="The answer comes within this time, with the best plan so far; null: no limit",
+    )
+
+
+class AnswerModel(BaseModel):
+    """Base of everything that is answered."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class StopModel(AnswerModel):
+    """One visit of a UAV."""
+
+    target_id: str = Field(description="The rescue area")
+    step: int = Field(description="Decision step, from 1")
+    arrival_time: float = Field(description="Time units from now, or h")
+    distance: float = Field(description="Length of the leg flown to it")
+    delivered: list[float] = Field(description="Amounts unloaded, one a material")
+
+
+class RouteModel(AnswerModel):
+    """What one UAV does: its stops in order, then home."""
+
+    uav_id: str = Field(description="The UAV")
+    distance: float = Field(description="Distance of the legs to its stops, without the leg home")
+    return_distance: float = Field(description="Length of the leg home")
+    stops: list[StopModel] = Field(description="Its visits")
+
+
+class UnmetModel(AnswerModel):
+    """A rescue area that does not get all it needs."""
+
+    target_id: str = Field(description="The rescue area")
+    remaining: list[float] = Field(description="Amounts still needed after the plan, one a material")
+    code: str = Field(description="The reason, for programs")
+    reason: str = Field(description="The reason, for people, with its numbers")
+
+
+class SourcePolicyModel(AnswerModel):
+    """The policy of the library that was transferred."""
+
+    id: str = Field(description="Its id, see `GET /library/{policy_id}`")
+    name: str = Field(description="Its name")
+    distance: float = Field(description="Sum of squared differences between the task descriptions")
+
+
+class HistoryModel(AnswerModel):
+    """Reward against epoch, as in the paper's figures; two lists of one length."""
+
+    epoch: list[int] = Field(description="Epochs or generations")
+    reward: list[float] = Field(description="Reward at that epoch")
+
+
+class Allocation(AnswerModel):
+    """A plan, what it earns, and how it was found."""
+
+    job_id: str = Field(description="The job that found it, see `GET /jobs/{job_id}`")
+    algorithm: str = Field(description="The algorithm that was used")
+    parameters: dict[str, Any] = Field(description="Its parameters as they were used, defaults filled in")
+    seed: int = Field(description="The seed that was used")
+    assignment: list[list[int]] = Field(
+        description="One joint action a step: for each UAV the index of its target, or N for home"
+    )
+    reward: float = Field(description="satisfaction - distance_weight · distance")
+    satisfaction: float = Field(description="Sum over the visits of level · delivered / needed")
+    distance: float = Field(description="Total distance, legs home only if they are charged")
+    distance_weight: float = Field(description="λ as it was used")
+    routes: list[RouteModel] = Field(description="One a UAV")
+    unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
+    source_policy: SourcePolicyModel | None = Field(description="What was transferred, if anything")
+    history: HistoryModel = Field(description="Reward against epoch")
+    elapsed_s: float = Field(description="Seconds from the request's arrival to the plan")

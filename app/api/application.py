@@ -1,0 +1,87 @@
+"""The application: its parts in order of their start, its routes, its middleware."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from asgi_correlation_id import CorrelationIdMiddleware
+from fastapi import FastAPI
+from starlette.middleware import Middleware
+
+import app
+from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
+from app.api.error_handlers import install_error_handlers
+from app.api.job_kinds import job_kinds
+from app.api.json_body import BodyLimit
+from app.api.routes import algorithms, allocation, examples, jobs, library, operations
+from app.api.services import Services
+from app.jobs.local import LocalExecutor
+from app.jobs.service import JobService
+from app.library.seeding import seed_library
+from app.settings import Settings
+from policy_store.checkpoint import ContainerLimits
+from policy_store.database import Database
+from policy_store.library import PolicyLibrary
+
+_WARM_UP = "app.jobs.work:warm_up"
+_REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
+
+
+def create_application(settings: Settings) -> FastAPI:
+    """Put the service together; it opens its database and starts its workers when it is started.
+
+    Parameters
+    ----------
+    settings
+        Everything an operator can set; nothing else is read from the environment.
+    """
+
+    @asynccontextmanager
+    async def lifespan(application: FastAPI) -> AsyncIterator[None]:
+        limits = ContainerLimits(bytes=settings.max_checkpoint_bytes)
+        database = Database(settings.resolved_database_url)
+        try:
+            store = PolicyLibrary(database, limits)
+            store.migrate()
+            seed_library(store, database)
+            service = JobService(
+                database,
+                job_kinds(store, limits),
+                LocalExecutor(settings.workers, warm_up=_WARM_UP),
+                max_queued=settings.queue_limit,
+                max_attempts=settings.job_attempts,
+                overrun_grace_s=settings.job_grace_s,
+            )
+            await service.start()
+            application.state.services = Services(settings, database, store, service)
+            try:
+                yield
+            finally:
+                await service.stop(settings.shutdown_grace_s)
+        finally:
+            database.dispose()
+
+    application = FastAPI(
+        title="UAV task allocation",
+        version=app.__version__,
+        description=DESCRIPTION,
+        openapi_tags=TAGS,
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+        generate_unique_id_function=operation_id,
+        middleware=[
+            Middleware(
+                CorrelationIdMiddleware,
+                validator=lambda given: _REQUEST_ID.fullmatch(given) is not None,
+            ),
+            Middleware(BodyLimit, limit=settings.max_body_bytes),
+        ],
+    )
+    for room in (allocation, algorithms, jobs, library, examples, operations):
+        application.include_router(room.router)
+    install_error_handlers(application)
+    install_documentation(application)
+    return application

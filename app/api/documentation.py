@@ -1,0 +1,70 @@
+"""The OpenAPI description, and the page that shows it, which loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.docs import get_swagger_ui_html
+from fastapi.routing import APIRoute
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse
+from starlette.staticfiles import StaticFiles
+
+from app.api.problem_details import ProblemDetails
+
+DESCRIPTION = """\
+Who flies where, with what: plans for swarms of UAVs that carry relief materials, after Yin, Guo, Su and Wang,
+"Task Allocation of Multiple Unmanned Aerial Vehicles Based on Deep Transfer Reinforcement Learning",
+Drones 2022, 6(8), 215.
+
+Errors are problem details (RFC 9457). Every response has an `X-Request-ID`, which is the request's if it
+has one.
+"""
+
+TAGS: list[dict[str, Any]] = [
+    {"name": "allocation", "description": "Plans, and the algorithms that find them"},
+    {"name": "jobs", "description": "What runs, ran, and waits"},
+    {"name": "library", "description": "Trained source tasks that can be transferred"},
+    {"name": "operations", "description": "Is it alive, is it ready"},
+]
+
+_ASSETS = "/docs/assets"
+
+
+def operation_id(route: APIRoute) -> str:
+    """Name an operation by its function, so that generated clients keep their names."""
+    return route.name
+
+
+def install_documentation(application: FastAPI) -> None:
+    """Give an application its ``/docs``, to which ``/`` leads, and errors in its OpenAPI description."""
+    generate = application.openapi
+
+    def openapi() -> dict[str, Any]:
+        new = application.openapi_schema is None
+        schema = generate()
+        if new:
+            problem = ProblemDetails.model_json_schema(ref_template="#/components/schemas/{model}")
+            components = schema["components"]["schemas"]
+            components |= problem.pop("$defs")
+            components["ProblemDetails"] = problem
+        return schema
+
+    async def show_documentation(request: Request) -> HTMLResponse:
+        root = request.scope.get("root_path", "").rstrip("/")
+        return get_swagger_ui_html(
+            openapi_url=f"{root}{application.openapi_url}",
+            title=application.title,
+            swagger_js_url=f"{root}{_ASSETS}/swagger-ui-bundle.js",
+            swagger_css_url=f"{root}{_ASSETS}/swagger-ui.css",
+            swagger_favicon_url=f"{root}{_ASSETS}/favicon-32x32.png",
+        )
+
+    async def lead_to_documentation(request: Request) -> RedirectResponse:
+        return RedirectResponse(f"{request.scope.get('root_path', '').rstrip('/')}/docs")
+
+    application.openapi = openapi  # type: ignore[method-assign]  # the documented way to change it
+    application.add_route("/", lead_to_documentation, include_in_schema=False)
+    application.add_route("/docs", show_documentation, include_in_schema=False)
+    application.mount(_ASSETS, StaticFiles(packages=[("fastapi_swagger", "resources")]))

@@ -1,0 +1,143 @@
+"""Every error of the service as problem details; nothing of a request is echoed but its path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from asgi_correlation_id import correlation_id
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+from app.api.errors import RequestError
+from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
+from app.domain.errors import AllocatorError, Violation
+from app.jobs import errors as job_errors
+from policy_store import errors as store_errors
+
+FORM_TAG = "form:"
+"""Begins the tags that tell the forms of a body apart; they are no part of a pointer."""
+
+_CODES: Mapping[type[Exception], str] = {
+    job_errors.JobNotFound: "job-not-found",
+    job_errors.InvalidCursor: "invalid-cursor",
+    job_errors.IdempotencyMismatch: "idempotency-key-reused",
+    job_errors.QueueFull: "queue-full",
+    job_errors.Draining: "draining",
+    store_errors.PolicyNotFound: "policy-not-found",
+    store_errors.InvalidCursor: "invalid-cursor",
+    store_errors.DuplicatePolicy: "duplicate-policy",
+    store_errors.InvalidPolicy: "invalid-policy",
+}
+_DRAINING_RETRY_S = 5.0
+
+
+def install_error_handlers(application: FastAPI) -> None:
+    """Make an application answer every error with problem details."""
+    application.add_exception_handler(RequestValidationError, _invalid_request)
+    application.add_exception_handler(HTTPException, _http_error)
+    application.add_exception_handler(RequestError, _request_error)
+    application.add_exception_handler(AllocatorError, _allocator_error)
+    for error in _CODES:
+        application.add_exception_handler(error, _known_error)
+    application.add_exception_handler(Exception, _defect)
+
+
+def field_errors(violations: Sequence[Violation], prefix: str = "") -> list[FieldError]:
+    """Put violations of the domain into the body they came in.
+
+    Parameters
+    ----------
+    violations
+        Pointers are relative to the problem.
+    prefix
+        Pointer of the problem in the body.
+    """
+    return [FieldError(pointer=prefix + v.pointer, detail=v.detail) for v in violations]
+
+
+def _instance(request: Request) -> str:
+    return request.url.path
+
+
+def _invalid_request(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    errors = [_field_error(item) for item in error.errors()]
+    first = errors[0]
+    where = first.parameter or first.pointer or "the body"
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return problem_response(
+        "invalid-request", f"{where}: {first.detail}{more}", _instance(request), errors=errors
+    )
+
+
+def _field_error(item: Mapping[str, Any]) -> FieldError:
+    place, *location = item["loc"]
+    detail = item["msg"]
+    if place != "body":
+        name = "/".join(map(str, location))
+        return FieldError(pointer="", detail=f"{place} parameter: {detail}", parameter=name)
+    steps = [str(step) for step in location if not str(step).startswith(FORM_TAG)]
+    pointer = "".join("/" + step.replace("~", "~0").replace("/", "~1") for step in steps)
+    return FieldError(pointer=pointer, detail=detail)
+
+
+def _http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    status = HTTPStatus(error.status_code)
+    codes = {404: "not-found", 405: "method-not-allowed", 400: "bad-request"}
+    code = codes.get(status.value, "internal-error")
+    detail = {
+        404: f"there is nothing at {_instance(request)}",
+        405: f"{request.method} is not possible at {_instance(request)}",
+    }.get(status.value, str(error.detail))
+    return problem_response(code, detail, _instance(request), headers=error.headers)
+
+
+def _request_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestError)
+    return problem_response(
+        error.code,
+        error.detail,
+        _instance(request),
+        errors=error.errors,
+        extensions=error.extensions,
+        headers=error.headers,
+    )
+
+
+def _allocator_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, AllocatorError)
+    if error.code not in STATUS_OF_CODE:
+        raise error
+    return problem_response(
+        error.code,
+        error.detail,
+        _instance(request),
+        errors=field_errors(error.violations),
+        extensions=error.details,
+    )
+
+
+def _known_error(request: Request, error: Exception) -> Response:
+    code = next(_CODES[kind] for kind in type(error).__mro__ if kind in _CODES)
+    headers = {}
+    if isinstance(error, job_errors.QueueFull | job_errors.Draining):
+        wait_s = getattr(error, "retry_after_s", _DRAINING_RETRY_S)
+        headers["Retry-After"] = str(max(1, math.ceil(wait_s)))
+    return problem_response(code, str(error), _instance(request), headers=headers)
+
+
+def _defect(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs the error
+    # This handler runs outside of the middleware that adds the id to other responses.
+    identifier = correlation_id.get() or ""
+    return problem_response(
+        "internal-error",
+        "the service has a defect or its machine is in trouble; the log has more under this request's id",
+        _instance(request),
+        headers={"X-Request-ID": identifier},
+    )

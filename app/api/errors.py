@@ -1,0 +1,137 @@
+"""Errors of the web room itself.
+
+RequestError
+ ├─ MalformedJson           the body is no JSON
+ ├─ UnsupportedMediaType    the body is not sent as JSON
+ ├─ BodyTooLarge            the body has more bytes than are taken
+ ├─ NotReady                a part of the service does not answer
+ ├─ JobCancelled            a job that somebody waits for was cancelled before it had a plan
+ ├─ JobFailed               a job that somebody waits for ended with an error
+ ├─ JobWithoutCheckpoint    a job is to be registered that has learned nothing
+ └─ ExampleNotFound         no example has that name
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.api.problem_details import FieldError
+
+
+class RequestError(Exception):
+    """Root of the tree: a problem's type, detail, and what else its response has.
+
+    Parameters
+    ----------
+    code
+        The problem's type.
+    detail
+        What is wrong.
+    errors, extensions, headers
+        As in :func:`app.api.problem_details.problem_response`.
+    """
+
+    def __init__(
+        self,
+        code: str,
+        detail: str,
+        *,
+        errors: Sequence[FieldError] = (),
+        extensions: Mapping[str, Any] | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.code = code
+        self.detail = detail
+        self.errors = tuple(errors)
+        self.extensions = dict(extensions or {})
+        self.headers = dict(headers or {})
+
+
+class MalformedJson(RequestError):
+    """The body is no JSON (RFC 8259) in UTF-8, or has a name twice in one object."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("malformed-json", f"the body is not JSON in UTF-8: {reason}")
+
+
+class UnsupportedMediaType(RequestError):
+    """The body is not sent as JSON."""
+
+    def __init__(self, given: str) -> None:
+        super().__init__(
+            "unsupported-media-type",
+            f"the body's content type is {given or 'not given'}, it has to be application/json",
+            headers={"Accept": "application/json"},
+        )
+
+
+class BodyTooLarge(RequestError):
+    """The body has more bytes than are taken."""
+
+    def __init__(self, limit: int, announced: int | None) -> None:
+        size = "more" if announced is None else f"{announced} bytes"
+        super().__init__(
+            "body-too-large",
+            f"at most {limit} bytes are taken, the body has {size}",
+            extensions={"limit": limit},
+        )
+
+
+class NotReady(RequestError):
+    """A part of the service does not answer."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("not-ready", reason, headers={"Retry-After": "1"})
+
+
+class JobCancelled(RequestError):
+    """A job that somebody waits for was cancelled before it had a plan."""
+
+    def __init__(self, job_id: str) -> None:
+        super().__init__(
+            "job-cancelled",
+            f"job {job_id} was cancelled before it had a plan",
+            extensions={"job_id": job_id},
+        )
+
+
+class JobFailed(RequestError):
+    """A job that somebody waits for ended with an error, which is answered as if it were the request's own.
+
+    Parameters
+    ----------
+    job_id, error
+        The job and its error object.
+    blamed
+        Pointer of the field at fault where the error names none.
+    """
+
+    def __init__(self, job_id: str, error: Mapping[str, Any], blamed: str | None = None) -> None:
+        errors = [FieldError(pointer=v["pointer"], detail=v["detail"]) for v in error["violations"]]
+        if not errors and blamed is not None:
+            errors = [FieldError(pointer=blamed, detail=error["detail"])]
+        super().__init__(
+            error["code"],
+            error["detail"],
+            errors=errors,
+            extensions={**error["details"], "job_id": job_id},
+        )
+
+
+class JobWithoutCheckpoint(RequestError):
+    """A job is to be registered that has learned nothing."""
+
+    def __init__(self, job_id: str, status: str) -> None:
+        super().__init__(
+            "job-without-checkpoint",
+            f"job {job_id} ({status}) has left no checkpoint that could be registered",
+        )
+
+
+class ExampleNotFound(RequestError):
+    """No example has that name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__("not-found", f"there is no example {name!r}")

@@ -1,0 +1,43 @@
+"""The kinds of job there are, and how trained policies come into the library with the end of their job."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection
+
+from app.domain.errors import InvalidCheckpoint
+from app.domain.records import problem_from_record
+from app.jobs.model import Job, JobKind, WorkResult
+from app.library.entries import new_policy
+from policy_store.checkpoint import ContainerLimits
+from policy_store.library import PolicyLibrary
+
+ALLOCATE = "allocate"
+TRAIN = "train"
+REGISTER = "register"
+
+
+def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
+    """List the kinds of job.
+
+    Parameters
+    ----------
+    library
+        Where policies are registered, in the transaction that ends their job.
+    limits
+        What a checkpoint may have at most.
+    """
+
+    def add_to_library(connection: Connection, job: Job, work: WorkResult) -> dict[str, Any]:
+        if work.artifact is None:
+            raise InvalidCheckpoint(f"{job.kind} job {job.id} has left no checkpoint")
+        task = problem_from_record(job.payload["problem"])
+        policy = library.add(new_policy(job.payload["name"], task, work.artifact, limits=limits), connection)
+        return {**work.result, "policy_id": policy.id}
+
+    return [
+        JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive"),
+        JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library),
+        JobKind(REGISTER, "app.jobs.work:register", "interactive", add_to_library),
+    ]

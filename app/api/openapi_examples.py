@@ -1,0 +1,85 @@
+"""Example bodies of the OpenAPI page: those of allocations can be sent as they are."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from typing import Any
+
+from fastapi.openapi.models import Example
+
+from app.solvers.registry import ALGORITHMS
+
+_FOLDER = resources.files("app.examples")
+_SUFFIX = ".json"
+
+_SHORT_PARAMETERS: dict[str, dict[str, Any]] = {"qmix": {"n_epochs": 2000}, "dqn": {"n_epochs": 2000}}
+"""What takes minutes by the paper's numbers is shortened."""
+
+_SMALL_TASK = {
+    "uavs": [
+        {"x_s": 0.1, "y_s": 0.2, "speed": 1.0, "voyage": 3.0, "loadlist": [5, 2]},
+        {"x_s": 0.8, "y_s": 0.4, "speed": 1.2, "voyage": 2.5, "loadlist": [3, 6]},
+    ],
+    "targets": [
+        {"x": 0.3, "y": 0.9, "level": 1.0, "loadlist": [2, 1]},
+        {"x": 0.6, "y": 0.1, "level": 0.4, "loadlist": [1, 3]},
+        {"x": 0.9, "y": 0.7, "level": 0.8, "loadlist": [4, 2]},
+    ],
+    "objective": {"distance_weight": 1.0},
+}
+
+
+def example_names() -> list[str]:
+    """List the shipped example problems."""
+    return sorted(
+        file.name.removesuffix(_SUFFIX) for file in _FOLDER.iterdir() if file.name.endswith(_SUFFIX)
+    )
+
+
+def example_problem(name: str) -> dict[str, Any]:
+    """Read a shipped example problem, one of :func:`example_names`."""
+    problem: dict[str, Any] = json.loads((_FOLDER / f"{name}{_SUFFIX}").read_text("utf-8"))
+    return problem
+
+
+def _allocation_example(name: str) -> dict[str, Any]:
+    # DQN's table has a column for every joint action, so it takes small problems only.
+    problem = _SMALL_TASK if name == "dqn" else example_problem("paper-5x10")
+    parameters = _SHORT_PARAMETERS.get(name)
+    return {"algorithm": name, **({"parameters": parameters} if parameters else {}), **problem}
+
+
+ALLOCATION_EXAMPLES: dict[str, Example] = {
+    algorithm.name: Example(summary=algorithm.summary, value=_allocation_example(algorithm.name))
+    for algorithm in ALGORITHMS.values()
+}
+
+REGISTRATION_EXAMPLES: dict[str, Example] = {
+    "train": Example(
+        summary="Train a source policy and register it at the end",
+        value={
+            "name": "a small town",
+            "task": _SMALL_TASK,
+            "train": {"algorithm": "qmix", "parameters": {"n_epochs": 2000}, "seed": 123},
+        },
+    ),
+    "job_id": Example(
+        summary="Register what an earlier job has learned",
+        value={"name": "yesterday's town", "job_id": "0123456789abcdef0123456789abcdef"},
+    ),
+    "checkpoint": Example(
+        summary="Register weights that were trained elsewhere (shortened here)",
+        value={
+            "name": "a town elsewhere",
+            "task": _SMALL_TASK,
+            "checkpoint": "AgAAAAAAAAB7fQ==",
+        },
+    ),
+}
+
+SIMILAR_EXAMPLES: dict[str, Example] = {
+    "paper": Example(
+        summary="A task of the paper's size", value={"task": example_problem("paper-5x10"), "k": 5}
+    )
+}

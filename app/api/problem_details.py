@@ -1,0 +1,152 @@
+"""Errors on the wire: problem details (RFC 9457), and the one table that gives error codes their HTTP status.
+
+The domain, the jobs and the store raise errors that know no HTTP; a code not in the table is a defect and
+answers 500.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import JSONResponse
+
+MEDIA_TYPE = "application/problem+json"
+
+STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
+    # the request itself
+    "malformed-json": HTTPStatus.BAD_REQUEST,
+    "bad-request": HTTPStatus.BAD_REQUEST,
+    "not-found": HTTPStatus.NOT_FOUND,
+    "method-not-allowed": HTTPStatus.METHOD_NOT_ALLOWED,
+    "body-too-large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    "unsupported-media-type": HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+    "invalid-request": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "invalid-cursor": HTTPStatus.UNPROCESSABLE_ENTITY,
+    # app.domain.errors
+    "invalid-problem": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "unknown-algorithm": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "invalid-parameters": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "problem-too-large": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "invalid-checkpoint": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "no-compatible-source": HTTPStatus.CONFLICT,
+    # app.jobs.errors and what a job can end with
+    "job-not-found": HTTPStatus.NOT_FOUND,
+    "idempotency-key-reused": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "job-cancelled": HTTPStatus.CONFLICT,
+    "job-without-checkpoint": HTTPStatus.CONFLICT,
+    "queue-full": HTTPStatus.TOO_MANY_REQUESTS,
+    "draining": HTTPStatus.SERVICE_UNAVAILABLE,
+    "not-ready": HTTPStatus.SERVICE_UNAVAILABLE,
+    "time-limit-exceeded": HTTPStatus.GATEWAY_TIMEOUT,
+    # policy_store.errors
+    "policy-not-found": HTTPStatus.NOT_FOUND,
+    "duplicate-policy": HTTPStatus.CONFLICT,
+    "invalid-policy": HTTPStatus.UNPROCESSABLE_ENTITY,
+}
+
+MAX_LISTED_ERRORS = 100
+"""A request of a thousand wrong numbers is told of the first hundred."""
+
+
+class FieldError(BaseModel):
+    """One thing that is wrong with a request."""
+
+    pointer: str = Field(
+        description="JSON pointer (RFC 6901) into the body; empty for the body as a whole",
+        examples=["/uavs/0/speed"],
+    )
+    detail: str = Field(description="What is wrong", examples=["Input should be greater than 0"])
+    parameter: str | None = Field(
+        default=None, description="The query parameter or header, where the error is not in the body"
+    )
+
+
+class ProblemDetails(BaseModel):
+    """Problem details (RFC 9457). Some problems have more members, such as `sizes` or `algorithms`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="Stable name of the problem", examples=["invalid-request"])
+    title: str = Field(description="The same for people", examples=["Unprocessable Entity"])
+    status: int = Field(description="HTTP status", examples=[422])
+    detail: str = Field(description="What is wrong with this request")
+    instance: str = Field(description="Path of the request", examples=["/allocate"])
+    errors: list[FieldError] | None = Field(
+        default=None, description="What is wrong, field by field, where that is known"
+    )
+
+
+def status_of(code: str) -> HTTPStatus:
+    """Give an error code its status; 500 for one that is not in the table."""
+    return STATUS_OF_CODE.get(code, HTTPStatus.INTERNAL_SERVER_ERROR)
+
+
+def problem_response(
+    code: str,
+    detail: str,
+    instance: str,
+    *,
+    errors: Sequence[FieldError] = (),
+    extensions: Mapping[str, Any] | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> JSONResponse:
+    """Make the response of a problem.
+
+    Parameters
+    ----------
+    code
+        The problem's type; the table has its status.
+    detail
+        What is wrong, with offending values and limits.
+    instance
+        Path of the request.
+    errors
+        Field by field; of many, the first are listed.
+    extensions
+        Further members, JSON-ready.
+    headers
+        Of the response.
+    """
+    status = status_of(code)
+    body: dict[str, Any] = {
+        **(extensions or {}),
+        "type": code,
+        "title": status.phrase,
+        "status": status.value,
+        "detail": printable(detail),
+        "instance": printable(instance),
+    }
+    if errors:
+        body["errors"] = [
+            {name: printable(value) for name, value in error.model_dump(exclude_none=True).items()}
+            for error in errors[:MAX_LISTED_ERRORS]
+        ]
+    return JSONResponse(body, status.value, dict(headers or {}), MEDIA_TYPE)
+
+
+def printable(text: str) -> str:
+    """Replace halves of surrogate pairs, which a request can contain and no response can be encoded with."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def responses(*codes: str) -> dict[int | str, dict[str, Any]]:
+    """Document the problems of a route for OpenAPI, those that every route has included.
+
+    Parameters
+    ----------
+    codes
+        Problem types that the route can answer with.
+    """
+    types: dict[int, list[str]] = {500: ["internal-error"]}
+    for code in codes:
+        types.setdefault(status_of(code).value, []).append(code)
+    return {
+        status: {
+            "description": f"{HTTPStatus(status).phrase}: {', '.join(f'`{name}`' for name in names)}",
+            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}},
+        }
+        for status, names in sorted(types.items())
+    }

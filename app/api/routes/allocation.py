@@ -1,0 +1,94 @@
+"""POST /allocate: who flies where, with what."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Request
+from starlette.responses import Response
+
+from app.api.allocation_models import Allocation, AllocationRequest
+from app.api.job_answers import accepted, answer_of, idempotency
+from app.api.job_kinds import ALLOCATE
+from app.api.job_models import JobModel
+from app.api.json_body import JsonRoute
+from app.api.openapi_examples import ALLOCATION_EXAMPLES
+from app.api.preferences import Preferences
+from app.api.problem_details import responses
+from app.api.problem_models import to_problem
+from app.api.routes.headers import LOCATION, IdempotencyKey, Prefer
+from app.api.services import Served
+from app.domain.records import problem_to_record
+from app.solvers.registry import parse_parameters
+
+router = APIRouter(route_class=JsonRoute, tags=["allocation"])
+
+
+@router.post(
+    "/allocate",
+    summary="Allocate tasks to a swarm",
+    response_model=Allocation,
+    response_description="The plan",
+    responses={
+        202: {
+            "model": JobModel,
+            "description": "Accepted: the job goes on, see `Location`",
+            "headers": LOCATION,
+        },
+        **responses(
+            "malformed-json",
+            "no-compatible-source",
+            "job-cancelled",
+            "body-too-large",
+            "unsupported-media-type",
+            "invalid-request",
+            "invalid-problem",
+            "problem-too-large",
+            "unknown-algorithm",
+            "invalid-parameters",
+            "idempotency-key-reused",
+            "queue-full",
+            "draining",
+            "time-limit-exceeded",
+        ),
+    },
+)
+async def allocate(
+    body: Annotated[AllocationRequest, Body(openapi_examples=ALLOCATION_EXAMPLES)],
+    request: Request,
+    services: Served,
+    prefer: Prefer = None,  # noqa: ARG001 - documents the header; several of it are read from the request
+    idempotency_key: IdempotencyKey = None,
+) -> Any:
+    """Find a plan for a problem.
+
+    The call waits for the plan and answers 200. With `Prefer: respond-async` it answers 202 at once, with
+    `Prefer: wait=N` after N seconds at most; `Location` is then the job to poll, to listen to, or to cancel.
+    """
+    problem = to_problem(body, services.settings)
+    parameters = parse_parameters(body.algorithm, body.parameters)
+    payload = {
+        "problem": problem_to_record(problem),
+        "algorithm": body.algorithm,
+        "parameters": parameters.model_dump(mode="json"),
+        "seed": body.seed,
+        "library_url": services.database.url,
+    }
+    job, _ = await services.jobs.submit(
+        ALLOCATE,
+        payload,
+        time_limit_s=body.time_limit_s,
+        idempotency=idempotency(idempotency_key, ALLOCATE, payload, body.time_limit_s),
+    )
+    preferences = Preferences.of(request.headers.getlist("prefer"))
+    patience_s = preferences.patience_s
+    if patience_s != 0:
+        job = await services.jobs.wait(job.id, patience_s)
+    if patience_s is not None and not job.status.finished:
+        return accepted(job, preferences)
+    answer = answer_of(job)
+    return Response(
+        Allocation(**answer).model_dump_json(),
+        media_type="application/json",
+        headers={"Preference-Applied": preferences.applied} if preferences.applied else None,
+    )

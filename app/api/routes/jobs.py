@@ -1,0 +1,98 @@
+"""Jobs: list, poll, listen, cancel."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Path, Query
+from sse_starlette import EventSourceResponse, ServerSentEvent
+from starlette.responses import JSONResponse
+
+from app.api.job_models import JobList, JobModel, job_list, job_model
+from app.api.library_models import JOB_ID_PATTERN
+from app.api.problem_details import responses
+from app.api.services import Served
+from app.jobs.service import JobService
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+JobId = Annotated[
+    str, Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32])
+]
+_MAX_EVENT_ID_DIGITS = 18
+
+
+@router.get(
+    "",
+    summary="List the jobs",
+    response_model=JobList,
+    responses=responses("invalid-request", "invalid-cursor"),
+)
+async def list_jobs(
+    services: Served,
+    limit: Annotated[int, Query(ge=1, le=100, description="Jobs a page")] = 20,
+    cursor: Annotated[str | None, Query(description="`next_cursor` of the page before")] = None,
+) -> JobList:
+    """List the jobs, newest first, without their results. New jobs do not shift the pages that follow."""
+    return job_list(await services.jobs.list(limit, cursor))
+
+
+@router.get(
+    "/{job_id}",
+    summary="Poll a job",
+    response_model=JobModel,
+    responses=responses("job-not-found", "invalid-request"),
+)
+async def get_job(job_id: JobId, services: Served) -> JobModel:
+    """Return a job: its progress and the best plan so far, at its end the result or the error."""
+    return job_model(await services.jobs.get(job_id))
+
+
+@router.get(
+    "/{job_id}/events",
+    summary="Listen to a job",
+    response_class=EventSourceResponse,
+    responses={
+        200: {
+            "description": "Server-sent events: `progress` with the fields of a job's progress, and one "
+            "`end`, which has its `status` too",
+            "content": {"text/event-stream": {"schema": {"type": "string"}}},
+        },
+        **responses("job-not-found", "invalid-request"),
+    },
+)
+async def get_job_events(
+    job_id: JobId,
+    services: Served,
+    last_event_id: Annotated[
+        str | None, Header(description="Id of the last event that was seen: only later ones are sent")
+    ] = None,
+) -> EventSourceResponse:
+    """Stream a job's progress until it ends; a client that was cut off goes on after its last event."""
+    await services.jobs.get(job_id)  # an unknown job is answered before the stream begins
+    given = last_event_id or ""
+    known = given.isascii() and given.isdigit() and len(given) <= _MAX_EVENT_ID_DIGITS
+    return EventSourceResponse(_events(services.jobs, job_id, int(given) if known else 0))
+
+
+@router.delete(
+    "/{job_id}",
+    summary="Cancel a job",
+    response_model=JobModel,
+    response_description="The job had ended, or has now",
+    responses={
+        202: {"model": JobModel, "description": "The job will stop"},
+        **responses("job-not-found", "invalid-request", "draining"),
+    },
+)
+async def cancel_job(job_id: JobId, services: Served) -> JSONResponse:
+    """Cancel a job. One that is running stops soon, and the best plan so far becomes its result."""
+    job = await services.jobs.cancel(job_id)
+    return JSONResponse(job_model(job).model_dump(mode="json"), 200 if job.status.finished else 202)
+
+
+async def _events(jobs: JobService, job_id: str, after: int) -> AsyncIterator[ServerSentEvent]:
+    async for event in jobs.events(job_id, after):
+        yield ServerSentEvent(json.dumps(event.data), event=event.name, id=str(event.id))

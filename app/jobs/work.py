@@ -1,0 +1,177 @@
+"""What jobs do: allocate, train, register. Only workers import this; the service knows it by name."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib import import_module
+from typing import Any
+
+from app.domain.allocation import Allocation
+from app.domain.errors import InvalidCheckpoint
+from app.domain.plan import Plan
+from app.domain.problem import UAV, Problem, Target
+from app.domain.records import problem_from_record, problem_to_record
+from app.jobs.model import Progress, WorkResult
+from app.jobs.work_context import WorkContext
+from app.simulation.explain import explain
+from app.solvers import protocol
+from app.solvers.registry import create_solver, parse_parameters
+
+_VERIFY = ("app.learning.checkpoint", "verify")
+
+_ANSWER_SHARE = 0.25
+_ANSWER_S = 0.03
+_ANSWER_S_A_PAIR = 1e-6
+
+_WARM_UP_PARAMETERS: dict[str, dict[str, Any]] = {
+    "greedy": {},
+    "ga": {"num_total": 4, "iteration": 2},
+    "qmix": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
+}
+
+
+def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+    """Solve a problem.
+
+    Parameters
+    ----------
+    payload
+        ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, and ``library_url``, the database
+        with the source policies.
+    context
+        Where progress goes. When it says stop, the best plan so far is the result.
+
+    Returns
+    -------
+    WorkResult
+        The answer of ``POST /allocate`` but for ``job_id`` and ``elapsed_s``; the artifact is the checkpoint
+        of what was learned.
+
+    Raises
+    ------
+    AllocatorError
+        If the algorithm refuses the problem or its parameters.
+    """
+    problem = problem_from_record(payload["problem"])
+    algorithm, seed = payload["algorithm"], payload["seed"]
+    parameters = parse_parameters(algorithm, payload["parameters"])
+    solver = create_solver(algorithm, parameters, protocol.SolverContext(payload["library_url"]))
+    solution = solver.solve(problem, seed, _stop(problem, context), _report(context))
+    allocation = explain(problem, solution.plan)
+    source = solution.source_policy
+    result = {
+        "algorithm": algorithm,
+        "parameters": solution.parameters.model_dump(mode="json"),
+        "seed": seed,
+        **_answer(allocation),
+        "source_policy": None if source is None else asdict(source),
+        "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
+    }
+    return WorkResult(result, solution.checkpoint)
+
+
+def train(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+    """Train a source policy on a task, which is what solving it by an algorithm that learns does.
+
+    Parameters
+    ----------
+    payload
+        As :func:`allocate` takes it, and ``name``, which is for the registration.
+    context
+        As in :func:`allocate`.
+
+    Raises
+    ------
+    AllocatorError
+        As in :func:`allocate`.
+    """
+    return allocate(payload, context)
+
+
+def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # noqa: ARG001 - nothing to report
+    """Check a checkpoint against its source task; to store it is the service's.
+
+    Parameters
+    ----------
+    payload
+        ``problem`` (a record), ``checkpoint_base64``, and ``name``, which is for the registration.
+    context
+        Not used: the check takes milliseconds.
+
+    Returns
+    -------
+    WorkResult
+        An empty result; the artifact is the checkpoint.
+
+    Raises
+    ------
+    InvalidCheckpoint
+        If it is not exactly what its architecture needs, or does not fit the task.
+    """
+    try:
+        checkpoint = base64.b64decode(payload["checkpoint_base64"], validate=True)
+    except binascii.Error as error:
+        raise InvalidCheckpoint(f"the checkpoint is not base64: {error}") from None
+    _verify(checkpoint, problem_from_record(payload["problem"]))
+    return WorkResult({}, checkpoint)
+
+
+def warm_up() -> None:
+    """Load and compile what every kind of job needs, so that nobody waits for it later."""
+    problem = Problem(
+        uavs=tuple(
+            UAV(f"uav-{i}", x_s=0, y_s=0, x_c=0, y_c=0, speed=1, voyage=10, loadlist=(2, 1)) for i in (1, 2)
+        ),
+        targets=tuple(Target(f"area-{j}", x=1, y=j, level=1, loadlist=(1, 2), deadline=9) for j in (1, 2, 3)),
+        max_steps=2,
+    )
+    payload = {"problem": problem_to_record(problem), "seed": 0, "library_url": None}
+    for algorithm, parameters in _WARM_UP_PARAMETERS.items():
+        context = WorkContext.in_process(lambda _progress: None, time_limit_s=None)
+        work = allocate({**payload, "algorithm": algorithm, "parameters": parameters}, context)
+        if work.artifact is not None:
+            _verify(work.artifact, problem)
+
+
+def _answer(allocation: Allocation) -> dict[str, Any]:
+    """Return an allocation by the field names of ``POST /allocate``."""
+    answer = asdict(allocation)
+    answer["assignment"] = answer.pop("plan")["assignment"]
+    return answer
+
+
+def _stop(problem: Problem, context: WorkContext) -> protocol.StopCriterion:
+    """Stop at a cancellation, or when only the time is left that the answer's way back takes."""
+    left = context.time_left()
+    if left is None:
+        return context.cancelled
+    pairs = problem.n_uavs * problem.n_targets + problem.n_targets**2
+    reserve = min(_ANSWER_SHARE * left, _ANSWER_S + _ANSWER_S_A_PAIR * pairs)
+
+    def stop() -> bool:
+        remaining = context.time_left()
+        return context.cancelled() or (remaining is not None and remaining <= reserve)
+
+    return stop
+
+
+def _report(context: WorkContext) -> Callable[[protocol.Progress], None]:
+    """Pass progress on; the plan is written out only when it is another one."""
+    written: tuple[Plan, list[list[int]]] | None = None
+
+    def report(progress: protocol.Progress) -> None:
+        nonlocal written
+        if written is None or written[0] is not progress.incumbent:
+            written = progress.incumbent, [list(row) for row in progress.incumbent.assignment]
+        context.report(Progress(progress.fraction, progress.epoch, progress.best_reward, written[1]))
+
+    return report
+
+
+def _verify(checkpoint: bytes, task: Problem) -> None:
+    """Check a checkpoint; by name, like the algorithms, so that this room does not depend on the learners."""
+    module, name = _VERIFY
+    getattr(import_module(module), name)(checkpoint, task)

@@ -1,0 +1,69 @@
+"""The shipped source policies, with which an empty library begins."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+from app.domain.errors import InvalidCheckpoint
+from app.domain.records import problem_from_record
+from app.library.entries import checkpoint_metadata, new_policy
+from policy_store.database import Database
+from policy_store.library import PolicyLibrary
+from policy_store.policy import NewPolicy
+
+_SUFFIX = ".safetensors"
+
+
+def shipped_policies() -> list[NewPolicy]:
+    """Read the policies in the folder ``seed`` beside this module, in the order of their file names.
+
+    A file's name is the policy's id, its metadata has the source task and, under ``name``, a name for
+    people.
+
+    Raises
+    ------
+    InvalidCheckpoint
+        If a shipped file is damaged.
+    """
+    folder = resources.files("app.library") / "seed"
+    if not folder.is_dir():
+        return []
+    found = []
+    for file in sorted(folder.iterdir(), key=lambda item: item.name):
+        if not file.name.endswith(_SUFFIX):
+            continue
+        identifier = file.name.removesuffix(_SUFFIX)
+        data = file.read_bytes()
+        metadata = checkpoint_metadata(data)
+        try:
+            task = problem_from_record(metadata["task"])
+        except (KeyError, TypeError) as error:
+            raise InvalidCheckpoint(f"{file.name}: its metadata has no source task") from error
+        found.append(new_policy(str(metadata.get("name", identifier)), task, data, policy_id=identifier))
+    return found
+
+
+def seed_library(library: PolicyLibrary, database: Database) -> int:
+    """Put the shipped policies into an empty library, all of them or none.
+
+    Two processes may do so at the same time: the policies have fixed ids, the second finds them there.
+
+    Parameters
+    ----------
+    library
+        The library; nothing happens if it has any policy.
+    database
+        The database it is in.
+
+    Returns
+    -------
+    int
+        How many policies were put in.
+    """
+    if library.count():
+        return 0
+    policies = shipped_policies()
+    with database.write() as connection:
+        for policy in policies:
+            library.add(policy, connection)
+    return len(policies)

@@ -1,0 +1,60 @@
+"""Every setting of the service, read once by the composition root; nothing else reads the environment."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Settings(BaseSettings):
+    """What an operator can set, by an environment variable ``ALLOCATOR_`` and the name in capitals."""
+
+    model_config = SettingsConfigDict(env_prefix="ALLOCATOR_", frozen=True, extra="forbid")
+
+    host: str = Field(default="127.0.0.1", description="Address the server listens on")
+    port: int = Field(
+        default=8000, ge=0, le=65_535, description="Port the server listens on; 0: any free one"
+    )
+    data_dir: Path = Field(default=Path("data"), description="Folder of the database; made where missing")
+    database_url: str | None = Field(
+        default=None, description="SQLAlchemy URL; default: the file `allocator.sqlite3` in the data folder"
+    )
+
+    workers: int = Field(
+        default_factory=lambda: os.cpu_count() or 1,
+        ge=1,
+        le=256,
+        description="Worker processes; default: one a processor",
+    )
+    queue_limit: int = Field(
+        default=64, ge=0, description="Jobs of a lane that may wait; one more is answered with 429"
+    )
+    job_grace_s: Seconds = Field(
+        default=5.0,
+        description="Seconds a job may go on after its cancellation or time limit; then it is killed",
+    )
+    shutdown_grace_s: Seconds = Field(
+        default=10.0, description="Seconds running jobs get at shutdown; then they go back to the queue"
+    )
+    job_attempts: int = Field(
+        default=3, ge=1, description="How often a job is tried whose worker or server died; then it fails"
+    )
+
+    max_body_bytes: int = Field(default=8 * 1024**2, ge=1024, description="Largest request body, in bytes")
+    max_checkpoint_bytes: int = Field(
+        default=4 * 1024**2, ge=1024, description="Largest checkpoint the library takes in, in bytes"
+    )
+    max_uavs: int = Field(default=1000, ge=1, description="Most UAVs in a problem")
+    max_targets: int = Field(default=2000, ge=1, description="Most rescue areas in a problem")
+    max_materials: int = Field(default=64, ge=1, description="Most kinds of material in a problem")
+
+    @property
+    def resolved_database_url(self) -> str:
+        """The database's URL, the default filled in."""
+        return self.database_url or f"sqlite:///{self.data_dir.absolute() / 'allocator.sqlite3'}"
