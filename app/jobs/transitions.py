@@ -14,7 +14,7 @@ from app.jobs.errors import JobNotFound
 from app.jobs.model import Job, JobStatus, Progress
 from app.jobs.tables import artifacts, jobs
 
-has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).correlate(jobs).label("has_artifact")
+has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
 select_jobs = sa.select(jobs, has_artifact)
 
 

@@ -1,0 +1,91 @@
+"""A service on a real database with real workers, and waiting for what must come true."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.jobs.local import LocalExecutor
+from app.jobs.model import Job, JobKind, JobStatus, WorkResult
+from app.jobs.service import JobService
+from policy_store.database import Database
+
+PATIENCE_S = 30.0
+
+
+def count_completion(connection: sa.Connection, job: Job, work: WorkResult) -> dict[str, Any]:
+    """Count in the transaction that marks a job succeeded how often that happens."""
+    connection.execute(sa.text("CREATE TABLE IF NOT EXISTS completions (job_id TEXT)"))
+    connection.execute(sa.text("INSERT INTO completions VALUES (:id)"), {"id": job.id})
+    return {**work.result, "registered": True}
+
+
+def kind(name: str, lane: str = "interactive") -> JobKind:
+    return JobKind(name, f"job_work:{name}", lane)  # type: ignore[arg-type]
+
+
+GATED = JobKind("gated", "job_work:until_file", "interactive", count_completion)
+KINDS = (
+    *(kind(name) for name in ("echo", "until_file", "until_stopped", "deaf", "chatter", "epochs", "die")),
+    *(kind(name) for name in ("refuse", "defect", "leave", "not_json", "surroundings")),
+    JobKind("train", "job_work:until_file", "training"),
+    GATED,
+)
+
+
+def make_service(
+    database: Database, *, kinds: Sequence[JobKind] = KINDS, slots: int = 1, **settings: Any
+) -> JobService:
+    return JobService(database, kinds, LocalExecutor(slots), **settings)
+
+
+def url_of(folder: Path) -> str:
+    return f"sqlite:///{folder / 'jobs.db'}"
+
+
+@asynccontextmanager
+async def running(folder: Path, *, grace_s: float = 0.0, **settings: Any) -> AsyncIterator[JobService]:
+    """Run a service on the database of a folder, with all workers warm."""
+    database = Database(url_of(folder))
+    service = make_service(database, **settings)
+    await service.start()
+    try:
+        await eventually(lambda: service.load().ready == service.load().capacity)
+        yield service
+    finally:
+        await service.stop(grace_s)
+        database.dispose()
+
+
+async def eventually(condition: Callable[[], bool | Awaitable[bool]]) -> None:
+    """Look until a condition holds; that it does not is an error, after a patience no test comes near."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        holds = condition()
+        if not isinstance(holds, bool):
+            holds = await holds
+        if holds:
+            return
+        assert time.monotonic() < deadline, "what was waited for did not come"
+        await asyncio.sleep(0.002)
+
+
+async def finished(service: JobService, job: Job) -> Job:
+    """Wait for a job's end."""
+    ended = await service.wait(job.id, PATIENCE_S)
+    assert ended.status.finished
+    return ended
+
+
+async def reports(service: JobService, job: Job) -> None:
+    """Wait until a job runs and has told of progress."""
+
+    async def has_progress() -> bool:
+        now = await service.get(job.id)
+        return now.status is JobStatus.RUNNING and now.progress.fraction > 0
+
+    await eventually(has_progress)

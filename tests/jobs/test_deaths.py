@@ -1,0 +1,219 @@
+"""Workers and services that are killed, by SIGKILL and in the midst of work."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import sqlalchemy as sa
+from harness import GATED, KINDS, PATIENCE_S, eventually, finished, make_service, reports, running, url_of
+
+from app.jobs.local import LocalExecutor
+from app.jobs.model import JobStatus
+from app.jobs.owner import is_alive, new_owner
+from app.jobs.service import JobService
+from policy_store.database import Database
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+
+def has_exited(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
+def test_a_job_survives_the_death_of_its_worker(tmp_path):
+    async def scenario():
+        async with running(tmp_path, slots=2) as service:
+            log = tmp_path / "deaths"
+            bystander, _ = await service.submit("until_file", {"path": str(tmp_path / "gate")})
+            job, _ = await service.submit("die", {"log": str(log), "deaths": 2})
+            done = await finished(service, job)
+            assert (done.status, done.attempt, done.result) == (JobStatus.SUCCEEDED, 3, {"deaths": 2})
+            assert len(set(log.read_text().split())) == 2
+            (tmp_path / "gate").touch()
+            assert (await finished(service, bystander)).attempt == 1
+
+    asyncio.run(scenario())
+
+
+def test_a_job_that_kills_three_workers_has_failed_and_the_others_go_on(tmp_path):
+    async def scenario():
+        async with running(tmp_path) as service:
+            job, _ = await service.submit("die", {"log": str(tmp_path / "deaths"), "deaths": 99})
+            others = [(await service.submit("echo", {"n": n}))[0] for n in range(3)]
+            done = await finished(service, job)
+            assert (done.status, done.attempt) == (JobStatus.FAILED, 3)
+            assert done.error["code"] == "worker-lost"
+            assert "3 attempts" in done.error["detail"]
+            for other in others:
+                assert (await finished(service, other)).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
+def test_an_idle_worker_that_dies_is_replaced_and_costs_no_attempt(tmp_path):
+    async def scenario():
+        async with running(tmp_path) as service:
+            pid = (await finished(service, (await service.submit("echo", {}))[0])).result["pid"]
+            os.kill(pid, signal.SIGKILL)
+            await eventually(lambda: service.load().ready == 0)
+            await eventually(lambda: service.load().ready == 1)
+            done = await finished(service, (await service.submit("echo", {}))[0])
+            assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
+            assert done.result["pid"] != pid
+
+    asyncio.run(scenario())
+
+
+def test_every_accepted_job_of_a_killed_service_is_finished_once(tmp_path):
+    gate = tmp_path / "gate"
+    process = subprocess.Popen(
+        [sys.executable, str(HERE / "service_process.py"), url_of(tmp_path), str(gate), "6"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{HERE}"},
+    )
+    accepted, workers = [], []
+    assert process.stdout is not None
+    for line in process.stdout:
+        what, *words = line.split()
+        if what == "working":
+            workers = [int(word) for word in words]
+            break
+        accepted += words
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    assert len(accepted) == 6
+    assert len(workers) == 2
+
+    async def scenario():
+        await eventually(lambda: all(has_exited(pid) for pid in workers))
+        gate.touch()
+        async with running(tmp_path, kinds=(GATED,), slots=2) as service:
+            attempts = []
+            for job_id in accepted:
+                done = await service.wait(job_id, PATIENCE_S)
+                assert done.status is JobStatus.SUCCEEDED
+                assert done.result["registered"]
+                attempts.append(done.attempt)
+            assert attempts == [2, 2, 1, 1, 1, 1]
+
+    asyncio.run(scenario())
+    database = Database(url_of(tmp_path))
+    with database.read() as connection:
+        completions = connection.scalars(sa.text("SELECT job_id FROM completions")).all()
+    database.dispose()
+    assert sorted(completions) == sorted(accepted)
+
+
+def test_progress_of_a_long_job_survives_a_crash(tmp_path):
+    async def scenario():
+        database = Database(url_of(tmp_path))
+        service = make_service(database)
+        await service.start()
+        job, _ = await service.submit("until_file", {"path": str(tmp_path / "gate")})
+        await reports(service, job)
+        shown = (await service.get(job.id)).progress
+
+        def stored() -> bool:
+            with database.read() as connection:
+                progress = connection.scalar(sa.text("SELECT progress FROM jobs"))
+            return f'"epoch": {shown.epoch}' in progress
+
+        await eventually(stored)
+        (tmp_path / "gate").touch()
+        await service.stop(PATIENCE_S)
+        database.dispose()
+
+    asyncio.run(scenario())
+
+
+def test_workers_are_single_threaded_warm_and_light(tmp_path):
+    async def scenario():
+        database = Database(url_of(tmp_path))
+        before = dict(os.environ)
+        executor = LocalExecutor(1, warm_up="job_work:warm_up")
+        service = JobService(database, KINDS, executor)
+        await service.start()
+        done = await finished(service, (await service.submit("surroundings", {}))[0])
+        assert done.result == {"threads": ["1", "1", "1"], "warm": True, "heavy": []}
+        assert dict(os.environ) == before
+        await service.stop(0)
+        database.dispose()
+
+    asyncio.run(scenario())
+
+
+def test_a_worker_whose_warm_up_fails_is_not_ready_and_tried_again(tmp_path):
+    async def scenario():
+        marker = tmp_path / "marker"
+        executor = LocalExecutor(
+            1,
+            warm_up="job_work:warm_up_at_second_try",
+            environment={"WARM_UP_MARKER": str(marker)},
+        )
+        warm = asyncio.Event()
+        await executor.start(warm.set)
+        await eventually(marker.exists)
+        assert executor.ready == 0
+        await asyncio.wait_for(warm.wait(), PATIENCE_S)
+        assert executor.ready == 1
+        await executor.close()
+        assert executor.ready == 0
+
+    asyncio.run(scenario())
+
+
+def test_closing_does_not_wait_for_a_worker_that_is_starting(tmp_path):
+    async def scenario():
+        executor = LocalExecutor(2)
+        await executor.start(lambda: None)
+        await asyncio.wait_for(executor.close(), PATIENCE_S)
+        assert executor.ready == 0
+
+    asyncio.run(scenario())
+
+
+def test_the_web_side_imports_neither_torch_nor_numba_and_the_worker_no_database():
+    for module, heavy in (
+        ("app.jobs.service, app.jobs.local", "{'torch', 'numba', 'numpy'}"),
+        ("app.jobs.worker", "{'torch', 'numba', 'numpy', 'sqlalchemy', 'alembic'}"),
+    ):
+        program = f"import sys, {module}; print(sorted({heavy} & set(sys.modules)))"
+        answer = subprocess.run(
+            [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        assert answer.stdout.strip() == "[]"
+
+
+def test_an_owner_is_alive_as_long_as_its_process():
+    me = new_owner()
+    assert is_alive(me, me)
+    program = "from app.jobs.owner import new_owner; print(new_owner(), flush=True); input()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdin is not None
+    other = process.stdout.readline().strip()
+    assert is_alive(other, me)
+    # The same process number given out again, another host, and an earlier service of this process.
+    host, pid, _start, token = other.rsplit(":", 3)
+    assert not is_alive(f"{host}:{pid}:1:{token}", me)
+    assert not is_alive(f"elsewhere:{pid}:1:{token}", me)
+    assert not is_alive(new_owner(), me)
+    process.kill()
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # dead, but not yet reaped
+    assert not is_alive(other, me)
+    process.stdin.close()
+    process.stdout.close()
+    process.wait()
+    assert not is_alive(other, me)
