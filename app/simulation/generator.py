@@ -118,6 +118,42 @@ def mid_mission(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Ge
     return replace(problem, uavs=uavs)
 
 
+def corridor(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `uniform`, but areas along a narrow valley or road, and bases near one end of it."""
+    problem = uniform(n_uavs, n_targets, n_materials, rng)
+    angle = rng.uniform(0, np.pi)
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    width = rng.uniform(0.02, 0.1)
+
+    def place(low: float, high: float) -> tuple[float, float]:
+        x, y = rng.uniform(low, high) * along + rng.normal(0, width) * across
+        return float(x), float(y)
+
+    targets = []
+    for target in problem.targets:
+        x, y = place(0.0, 1.2)
+        targets.append(replace(target, x=x, y=y))
+    return replace(
+        problem, uavs=tuple(_moved(u, *place(-0.1, 0.3)) for u in problem.uavs), targets=tuple(targets)
+    )
+
+
+def mixed_loads(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `uniform`, but a few carriers with large loads among many UAVs with small ones."""
+    problem = uniform(n_uavs, n_targets, n_materials, rng)
+    large = rng.random(n_uavs) < 0.25
+    factor = np.where(large, rng.uniform(2, 5, n_uavs), rng.uniform(0.2, 0.6, n_uavs))
+    uavs = tuple(
+        replace(
+            u,
+            loadlist=tuple(float(np.ceil(amount * f)) for amount in u.loadlist),
+            speed=0.6 * u.speed if big else u.speed,
+        )
+        for u, f, big in zip(problem.uavs, factor, large, strict=True)
+    )
+    return replace(problem, uavs=uavs)
+
+
 FAMILIES: Mapping[str, Family] = {
     "uniform": uniform,
     "clustered": clustered,
@@ -125,6 +161,8 @@ FAMILIES: Mapping[str, Family] = {
     "single_base": single_base,
     "deadline": deadline,
     "mid_mission": mid_mission,
+    "corridor": corridor,
+    "mixed_loads": mixed_loads,
 }
 """The task families by name."""
 
