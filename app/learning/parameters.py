@@ -1,0 +1,123 @@
+"""Parameters of the learners, by the paper's names (Tables 1 and 3); no torch here.
+
+Tables 1 and 3 also list ``seed``, which is the request's. What the tables leave out comes from the family of
+public QMIX implementations whose parameter names the paper uses.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from app.solvers.protocol import Parameters
+
+MAX_EPOCHS = 10_000_000
+MAX_STORED_EPISODES = 100_000
+MAX_HIDDEN_UNITS = 1024
+
+
+class LearningParameters(Parameters):
+    """What every learner has: Table 1's schedule, and the decisions it leaves open."""
+
+    n_epochs: int = Field(
+        default=50_000, ge=0, le=MAX_EPOCHS, description="Epochs; one episode and one update each (Table 1)"
+    )
+    evaluate_per_epoch: int = Field(
+        default=100,
+        ge=1,
+        le=MAX_EPOCHS,
+        description="Epochs from one greedy evaluation to the next (Table 1)",
+    )
+    batch_size: int = Field(default=32, ge=1, le=4096, description="Episodes an update (Table 1)")
+    buffer_size: int = Field(
+        default=100, ge=1, le=MAX_STORED_EPISODES, description="Episodes the replay buffer holds (Table 1)"
+    )
+    update_target_params: int = Field(
+        default=200,
+        ge=1,
+        le=MAX_EPOCHS,
+        description="Epochs from one copy to the target network to the next (Table 1)",
+    )
+    lr: float = Field(default=5e-4, gt=0, le=1, description="Learning rate of RMSprop")
+    gamma: float = Field(default=0.99, ge=0, le=1, description="Discount")
+    grad_norm_clip: float = Field(default=10.0, gt=0, le=1e6, description="Largest norm of the gradient")
+    epsilon_start: float = Field(
+        default=1.0, ge=0, le=1, description="Probability of a random action at the beginning"
+    )
+    epsilon_end: float = Field(
+        default=0.05, ge=0, le=1, description="Probability of a random action after the annealing"
+    )
+    epsilon_anneal_steps: int = Field(
+        default=50_000,
+        ge=1,
+        le=1_000_000_000,
+        description="Environment steps over which it changes, linearly",
+    )
+    learning_starts: int | None = Field(
+        default=None,
+        ge=1,
+        le=MAX_STORED_EPISODES,
+        description="Stored episodes before the first update; null: a full buffer (Algorithm 1, line 10)",
+    )
+
+    @property
+    def first_update(self) -> int:
+        """Stored episodes before the first update; a full buffer is always enough."""
+        return min(self.learning_starts or self.buffer_size, self.buffer_size)
+
+
+class QmixParameters(LearningParameters):
+    """Table 1 of the paper."""
+
+    mode: Literal["service", "paper"] = Field(
+        default="service",
+        description="paper: Algorithm 1 to the letter; service: the service's own best, the same for now",
+    )
+    drqn_hidden_dim: int = Field(
+        default=64, ge=1, le=MAX_HIDDEN_UNITS, description="Hidden units of the agent network (Table 1)"
+    )
+    qmix_hidden_dim: int = Field(
+        default=32, ge=1, le=MAX_HIDDEN_UNITS, description="Hidden units of the mixing network (Table 1)"
+    )
+
+
+class TransferQmixParameters(QmixParameters):
+    """Table 3 of the paper; exploration begins where a trained policy's ends."""
+
+    mode: Literal["service", "paper"] = Field(
+        default="service",
+        description="paper: Algorithm 2 to the letter; service: the service's own best, the same for now",
+    )
+    n_epochs: int = Field(
+        default=200,
+        ge=0,
+        le=MAX_EPOCHS,
+        description="Epochs of fine-tuning; one episode and at most one update each (Table 3); 0: none",
+    )
+    evaluate_per_epoch: int = Field(
+        default=1, ge=1, le=MAX_EPOCHS, description="Epochs from one greedy evaluation to the next (Table 3)"
+    )
+    update_target_params: int = Field(
+        default=200,
+        ge=1,
+        le=MAX_EPOCHS,
+        description="Epochs, or updates, from one copy to the target network to the next (Table 3)",
+    )
+    epsilon_start: float = Field(
+        default=0.05, ge=0, le=1, description="Probability of a random action at the beginning"
+    )
+    source: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=128,
+        description="Library id of the policy to transfer; null: the one of the most similar source task",
+    )
+
+
+class DqnParameters(LearningParameters):
+    """The method of section 4.1; the paper gives it no table, so it takes Table 1's."""
+
+    hidden_dim: int = Field(
+        default=64, ge=1, le=MAX_HIDDEN_UNITS, description="Units of each of the two hidden layers"
+    )

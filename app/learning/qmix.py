@@ -1,0 +1,147 @@
+"""QMIX from scratch (Algorithm 1)."""
+
+from __future__ import annotations
+
+from app.domain.errors import ProblemTooLarge
+from app.domain.problem import Problem
+from app.learning.architecture import NetworkSizes, QmixConfig
+from app.learning.checkpoint import encode
+from app.learning.environment import SwarmEnvironment
+from app.learning.episode import Actor
+from app.learning.learner import Learner
+from app.learning.networks import QmixNetwork
+from app.learning.parameters import LearningParameters, QmixParameters
+from app.learning.random_streams import RandomStreams, random_streams
+from app.learning.replay_buffer import ReplayBuffer
+from app.learning.threads import one_thread
+from app.learning.trainer import Incumbent, Trainer, Training
+from app.solvers.protocol import Report, Solution, SolverContext, StopCriterion
+
+MAX_TRAINING_BYTES = 2**30
+"""Most memory that replay buffer and one update may take; workers share a machine."""
+
+_ACTIVATIONS = 16
+"""Numbers kept for the backward pass per hidden unit of an agent in a step; measured, rounded up."""
+
+
+def require_memory(
+    parameters: LearningParameters, sizes: NetworkSizes, max_steps: int, hidden_dim: int
+) -> None:
+    """Refuse a problem whose training would not fit into memory.
+
+    Raises
+    ------
+    ProblemTooLarge
+        If replay buffer and one update would take more than :data:`MAX_TRAINING_BYTES`.
+    """
+    stored = ReplayBuffer.bytes_needed(parameters.buffer_size, sizes, max_steps)
+    batch = min(parameters.batch_size, parameters.buffer_size)
+    rows = batch * max_steps * sizes.n_agents
+    needed = stored + 4 * rows * (_ACTIVATIONS * hidden_dim + 4 * sizes.n_actions)
+    if needed > MAX_TRAINING_BYTES:
+        raise ProblemTooLarge(
+            f"{sizes.n_agents} agents with {sizes.n_actions} actions over {max_steps} steps, "
+            f"{parameters.buffer_size} stored episodes and batches of {batch} take {needed / 2**20:.0f} MiB; "
+            f"the limit is {MAX_TRAINING_BYTES / 2**20:.0f} MiB"
+        )
+
+
+def qmix_config(problem: Problem, parameters: QmixParameters) -> QmixConfig:
+    """Return what fixes the networks' shapes."""
+    return QmixConfig(
+        problem.n_uavs,
+        problem.n_targets,
+        problem.n_materials,
+        parameters.drqn_hidden_dim,
+        parameters.qmix_hidden_dim,
+    )
+
+
+def train(
+    problem: Problem,
+    network: QmixNetwork,
+    parameters: QmixParameters,
+    streams: RandomStreams,
+    stop: StopCriterion,
+    report: Report,
+    *,
+    count_updates: bool = False,
+) -> Training:
+    """Run Algorithm 1 from networks as they are; their weights are changed.
+
+    Parameters
+    ----------
+    problem, parameters, streams, stop, report
+        As in :class:`~app.learning.trainer.Trainer`.
+    network
+        Networks for a problem of this size.
+    count_updates
+        Whether the target network's period is counted in updates too.
+    """
+    sizes = SwarmEnvironment(problem).sizes
+    trainer = Trainer(
+        explorer=Actor(SwarmEnvironment(problem), network),
+        evaluator=Actor(SwarmEnvironment(problem), network),
+        learner=Learner(network, parameters.lr, parameters.gamma, parameters.grad_norm_clip),
+        buffer=ReplayBuffer(parameters.buffer_size, sizes, problem.max_steps),
+        parameters=parameters,
+        streams=streams,
+        count_updates=count_updates,
+    )
+    return trainer.run(Incumbent.empty(problem), stop, report)
+
+
+def metrics_of(training: Training) -> dict[str, float | int]:
+    """Return what a checkpoint tells about its training.
+
+    ``reward`` is the best plan's, ``greedy_reward`` that of the last greedy evaluation.
+    """
+    return {
+        "reward": training.incumbent.reward,
+        "greedy_reward": training.history.reward[-1],
+        "epochs": training.epochs,
+        "steps": training.steps,
+    }
+
+
+class Qmix:
+    """Multi-agent Q-learning with a monotonic mixing network, from scratch.
+
+    Parameters
+    ----------
+    parameters
+        Table 1.
+    context
+        Not used: nothing is transferred.
+    """
+
+    def __init__(self, parameters: QmixParameters, context: SolverContext) -> None:  # noqa: ARG002 - the protocol's
+        self._parameters = parameters
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """Train on the problem and return the best plan seen; see :class:`~app.solvers.protocol.Solver`.
+
+        Raises
+        ------
+        ProblemTooLarge
+            If training would not fit into memory.
+        """
+        parameters = self._parameters
+        config = qmix_config(problem, parameters)
+        require_memory(parameters, config.sizes, problem.max_steps, parameters.drqn_hidden_dim)
+        streams = random_streams(seed)
+        with one_thread():
+            network = QmixNetwork(
+                config.sizes, parameters.drqn_hidden_dim, parameters.qmix_hidden_dim, streams.initialisation
+            )
+            training = train(problem, network, parameters, streams, stop, report)
+            checkpoint = encode(
+                network,
+                config=config,
+                task=problem,
+                algorithm="qmix",
+                seed=seed,
+                parameters=parameters,
+                metrics=metrics_of(training),
+            )
+        return Solution(training.incumbent.plan, training.history, parameters, checkpoint=checkpoint)

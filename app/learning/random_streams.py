@@ -1,0 +1,31 @@
+"""The independent random streams that one seed gives a learner."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+
+class RandomStreams(NamedTuple):
+    """One generator a purpose, so that drawing more for one purpose changes nothing for another."""
+
+    initialisation: torch.Generator
+    exploration: np.random.Generator
+    replay: np.random.Generator
+
+
+def random_streams(seed: int) -> RandomStreams:
+    """Spawn the streams.
+
+    Parameters
+    ----------
+    seed
+        Any integer.
+    """
+    # The entropy of a SeedSequence is not negative: the sign is a word of its own.
+    root = np.random.SeedSequence([abs(seed), int(seed < 0)])
+    initialisation, exploration, replay = root.spawn(3)
+    generator = torch.Generator().manual_seed(int(initialisation.generate_state(1, np.uint64)[0]))
+    return RandomStreams(generator, np.random.default_rng(exploration), np.random.default_rng(replay))

@@ -1,0 +1,251 @@
+"""The GRU along whole episodes, forward and backward, with its element-wise part compiled.
+
+Same function as ``torch.gru``, and tested against it. There, most of the time goes into some forty small
+element-wise operations; here each step is one matrix product and one pass over memory that stays in the
+processor's cache. At 5 UAVs and 10 targets a forward and backward pass takes about half as long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from numba import njit
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+Float32s = npt.NDArray[np.float32]
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Contraction to fused multiply-adds, and no care for NaN, infinity or the sign of zero: without these the
+# loops are not vectorised. Nothing is reordered, so the same input gives the same output.
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "fastmath": {"contract", "nnan", "ninf", "nsz"},
+}
+_kernel: Callable[[Function], Function] = njit(**_OPTIONS)
+
+_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)
+_SATURATED = np.float32(9.0)
+_P0, _P1, _P2 = np.float32(135135.0), np.float32(17325.0), np.float32(378.0)
+_Q1, _Q2, _Q3 = np.float32(62370.0), np.float32(3150.0), np.float32(28.0)
+
+
+@_kernel
+def _tanh(x: Any) -> Any:
+    """Hyperbolic tangent to 3e-7: Lambert's continued fraction of x/2, then the double angle.
+
+    A rational function, because calls of the mathematical library are not vectorised.
+    """
+    x = _SATURATED if x > _SATURATED else x
+    x = -_SATURATED if x < -_SATURATED else x
+    y = _HALF * x
+    s = y * y
+    p = y * (_P0 + s * (_P1 + s * (_P2 + s)))
+    q = _P0 + s * (_Q1 + s * (_Q2 + s * _Q3))
+    return _TWO * p * q / (p * p + q * q)
+
+
+# One loop a function: the compiler vectorises a loop over a few arrays, and gives up on one over ten.
+
+
+@_kernel
+def _sigmoid_of_sum(a: Float32s, b: Float32s) -> None:
+    for c in range(a.shape[0]):
+        a[c] = _HALF * _tanh(_HALF * (a[c] + b[c])) + _HALF
+
+
+@_kernel
+def _add(out: Float32s, a: Float32s, b: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = a[c] + b[c]
+
+
+@_kernel
+def _multiply(out: Float32s, a: Float32s, b: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = a[c] * b[c]
+
+
+@_kernel
+def _candidate(n: Float32s, r: Float32s, recurrent: Float32s) -> None:
+    for c in range(n.shape[0]):
+        n[c] = _tanh(n[c] + r[c] * recurrent[c])
+
+
+@_kernel
+def _interpolate(out: Float32s, n: Float32s, z: Float32s, before: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = n[c] + z[c] * (before[c] - n[c])
+
+
+@_kernel
+def _candidate_gradient(out: Float32s, d: Float32s, z: Float32s, n: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = d[c] * (_ONE - z[c]) * (_ONE - n[c] * n[c])
+
+
+@_kernel
+def _update_gradient(out: Float32s, d: Float32s, before: Float32s, n: Float32s, z: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = d[c] * (before[c] - n[c]) * z[c] * (_ONE - z[c])
+
+
+@_kernel
+def _reset_gradient(out: Float32s, dn: Float32s, recurrent: Float32s, r: Float32s) -> None:
+    for c in range(out.shape[0]):
+        out[c] = dn[c] * recurrent[c] * r[c] * (_ONE - r[c])
+
+
+@_kernel
+def _forward_step(
+    gates: Float32s,
+    products: Float32s,
+    bias: Float32s,
+    before: Float32s,
+    recurrent: Float32s,
+    hidden: Float32s,
+) -> None:
+    """One step of every row.
+
+    Parameters
+    ----------
+    gates
+        (R, 3H) parts of the gates' pre-activations that come from the input; overwritten by r, z and n.
+    products
+        (R, 3H) parts that come from the hidden state before, without biases.
+    bias
+        (H,) recurrent bias of the candidate n; the other biases are in `gates`.
+    before
+        (R, H) hidden state before.
+    recurrent, hidden
+        (R, H), overwritten: what r multiplies, and the new hidden state.
+    """
+    rows, h = hidden.shape
+    for i in range(rows):
+        _sigmoid_of_sum(gates[i, : 2 * h], products[i, : 2 * h])
+        _add(recurrent[i], products[i, 2 * h :], bias)
+        _candidate(gates[i, 2 * h :], gates[i, :h], recurrent[i])
+        _interpolate(hidden[i], gates[i, 2 * h :], gates[i, h : 2 * h], before[i])
+
+
+@_kernel
+def _backward_step(
+    gradient: Float32s,
+    carry: Float32s,
+    gates: Float32s,
+    recurrent: Float32s,
+    before: Float32s,
+    d_input: Float32s,
+    d_products: Float32s,
+) -> None:
+    """One step of every row, backward.
+
+    Parameters
+    ----------
+    gradient
+        (R, H) of the loss by this step's hidden state, as read by later layers.
+    carry
+        (R, H) the same by way of the next step; overwritten by the part for the step before that does not go
+        through the matrix product.
+    gates, recurrent, before
+        As left by :func:`_forward_step`.
+    d_input, d_products
+        (R, 3H), overwritten: gradients of the two parts of the pre-activations.
+    """
+    rows, h = carry.shape
+    for i in range(rows):
+        r, z, n = gates[i, :h], gates[i, h : 2 * h], gates[i, 2 * h :]
+        d, dn = carry[i], d_input[i, 2 * h :]
+        _add(d, d, gradient[i])
+        _candidate_gradient(dn, d, z, n)
+        _update_gradient(d_input[i, h : 2 * h], d, before[i], n, z)
+        _reset_gradient(d_input[i, :h], dn, recurrent[i], r)
+        for c in range(2 * h):
+            d_products[i, c] = d_input[i, c]
+        _multiply(d_products[i, 2 * h :], dn, r)
+        _multiply(d, d, z)
+
+
+class _Gru(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, inputs: Tensor, weight_ih: Tensor, weight_hh: Tensor, bias_ih: Tensor, bias_hh: Tensor
+    ) -> Tensor:
+        steps, rows, h = *inputs.shape[:2], weight_hh.shape[1]
+        bias = bias_ih.clone()
+        bias[: 2 * h] += bias_hh[: 2 * h]
+        gates = torch.addmm(bias, inputs.flatten(0, 1), weight_ih.t()).view(steps, rows, 3 * h)
+        hidden = inputs.new_empty(steps + 1, rows, h)
+        hidden[0] = 0.0
+        recurrent = inputs.new_empty(steps, rows, h)
+        products = inputs.new_zeros(rows, 3 * h)
+        views = gates.numpy(), products.numpy(), bias_hh[2 * h :].numpy(), hidden.numpy(), recurrent.numpy()
+        for t in range(steps):
+            if t > 0:
+                torch.mm(hidden[t], weight_hh.t(), out=products)
+            _forward_step(views[0][t], views[1], views[2], views[3][t], views[4][t], views[3][t + 1])
+        ctx.save_for_backward(inputs, weight_ih, weight_hh, gates, hidden, recurrent)
+        return hidden[1:]
+
+    @staticmethod
+    @once_differentiable  # type: ignore[untyped-decorator]
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, ...]:
+        inputs, weight_ih, weight_hh, gates, hidden, recurrent = ctx.saved_tensors
+        steps, rows, h = recurrent.shape
+        d_input, d_products = torch.empty_like(gates), torch.empty_like(gates)
+        carry = torch.zeros_like(recurrent[0])
+        arrays = (
+            gradient.contiguous().numpy(),
+            carry.numpy(),
+            gates.numpy(),
+            recurrent.numpy(),
+            hidden.numpy(),
+        )
+        d_views = d_input.numpy(), d_products.numpy()
+        for t in range(steps - 1, -1, -1):
+            _backward_step(
+                arrays[0][t],
+                arrays[1],
+                arrays[2][t],
+                arrays[3][t],
+                arrays[4][t],
+                d_views[0][t],
+                d_views[1][t],
+            )
+            if t > 0:
+                carry.addmm_(d_products[t], weight_hh)
+        flat, flat_products = d_input.view(-1, 3 * h), d_products.view(-1, 3 * h)
+        d_bias_ih = flat.sum(0)
+        return (
+            torch.mm(flat, weight_ih).view(steps, rows, -1),
+            torch.mm(flat.t(), inputs.flatten(0, 1)),
+            # The first step's hidden state is zero: it adds nothing to the recurrent weights' gradient.
+            torch.mm(flat_products[rows:].t(), hidden[1:-1].reshape(-1, h)),
+            d_bias_ih,
+            torch.cat((d_bias_ih[: 2 * h], flat_products[:, 2 * h :].sum(0))),
+        )
+
+
+def gru(inputs: Tensor, weight_ih: Tensor, weight_hh: Tensor, bias_ih: Tensor, bias_hh: Tensor) -> Tensor:
+    """Hidden states of a GRU along sequences, each from zeros.
+
+    Parameters
+    ----------
+    inputs
+        (T, R, I) float32.
+    weight_ih, weight_hh, bias_ih, bias_hh
+        Of a :class:`torch.nn.GRUCell` with H hidden units: (3H, I), (3H, H), (3H,), (3H,).
+
+    Returns
+    -------
+    Tensor
+        (T, R, H).
+    """
+    hidden: Tensor = _Gru.apply(inputs, weight_ih, weight_hh, bias_ih, bias_hh)
+    return hidden

@@ -1,0 +1,147 @@
+"""The loop of Algorithm 1: play, store, update, evaluate; the best plan ever seen is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.learning.episode import Actor, EpisodeRecord
+from app.learning.exploration import EpsilonSchedule
+from app.learning.learner import Learner
+from app.learning.parameters import LearningParameters
+from app.learning.random_streams import RandomStreams
+from app.learning.replay_buffer import ReplayBuffer
+from app.simulation.explain import reward_of
+from app.solvers.protocol import History, Progress, Report, StopCriterion
+
+
+@dataclass
+class Incumbent:
+    """The best plan so far, by its true reward."""
+
+    plan: Plan
+    reward: float
+
+    @classmethod
+    def empty(cls, problem: Problem) -> Incumbent:
+        """Begin with the plan that sends everybody home: what is returned is never worse."""
+        plan = Plan.empty(problem.n_uavs, problem.n_targets)
+        return cls(plan, reward_of(problem, plan))
+
+
+@dataclass
+class Training:
+    """What a run of the trainer left behind, beside the network.
+
+    Attributes
+    ----------
+    incumbent
+        The best plan of all evaluations and all episodes of exploration.
+    history
+        Reward of the greedy evaluations.
+    epochs
+        Epochs begun and ended.
+    steps
+        Environment steps of exploration.
+    """
+
+    incumbent: Incumbent
+    history: History = field(default_factory=History)
+    epochs: int = 0
+    steps: int = 0
+
+
+class Trainer:
+    """Algorithm 1, one episode and at most one update an epoch.
+
+    Parameters
+    ----------
+    explorer, evaluator
+        Actors of the learner's network, each with an environment of its own, so that evaluating changes
+        nothing for the exploration.
+    learner
+        Updates the network.
+    buffer
+        Stores the explorer's episodes.
+    parameters
+        The schedule.
+    streams
+        Random numbers; the evaluations draw none.
+    count_updates
+        Whether the target network is copied every `update_target_params` updates as well as epochs.
+    """
+
+    def __init__(
+        self,
+        *,
+        explorer: Actor,
+        evaluator: Actor,
+        learner: Learner,
+        buffer: ReplayBuffer,
+        parameters: LearningParameters,
+        streams: RandomStreams,
+        count_updates: bool = False,
+    ) -> None:
+        self._explorer = explorer
+        self._evaluator = evaluator
+        self._learner = learner
+        self._buffer = buffer
+        self._parameters = parameters
+        self._streams = streams
+        self._count_updates = count_updates
+        self._schedule = EpsilonSchedule(
+            parameters.epsilon_start, parameters.epsilon_end, parameters.epsilon_anneal_steps
+        )
+
+    def run(self, incumbent: Incumbent, stop: StopCriterion, report: Report) -> Training:
+        """Train until the epochs are used up or `stop` says so.
+
+        The network is evaluated before the first epoch, which is epoch 0 of the history, also when `stop`
+        is true from the beginning; then every `evaluate_per_epoch` epochs and after the last.
+
+        Parameters
+        ----------
+        incumbent
+            A plan to begin with; replaced in the result by any better one.
+        stop
+            Asked before every epoch.
+        report
+            Told after every epoch.
+        """
+        parameters = self._parameters
+        training = Training(incumbent)
+        if self._evaluate(training).length == 0:
+            return training  # Nothing can be flown, so there is nothing to learn.
+        while training.epochs < parameters.n_epochs and not stop():
+            training.epochs += 1
+            self._play_and_learn(training)
+            if training.epochs % parameters.evaluate_per_epoch == 0 or training.epochs == parameters.n_epochs:
+                self._evaluate(training)
+            best = training.incumbent
+            report(Progress(training.epochs / parameters.n_epochs, training.epochs, best.reward, best.plan))
+        return training
+
+    def _play_and_learn(self, training: Training) -> None:
+        record = self._explorer.play(self._schedule, training.steps, self._streams.exploration)
+        training.steps += record.length
+        self._consider(record, training)
+        self._buffer.add(record)
+        learner, period = self._learner, self._parameters.update_target_params
+        copy_target = training.epochs % period == 0
+        if len(self._buffer) >= self._parameters.first_update:
+            learner.update(self._buffer.sample(self._parameters.batch_size, self._streams.replay))
+            copy_target |= self._count_updates and learner.updates % period == 0
+        if copy_target:
+            learner.update_target()
+
+    def _evaluate(self, training: Training) -> EpisodeRecord:
+        record = self._evaluator.play_greedily()
+        self._consider(record, training)
+        training.history.add(training.epochs, record.reward if record.length else training.incumbent.reward)
+        return record
+
+    def _consider(self, record: EpisodeRecord, training: Training) -> None:
+        if record.length and record.reward > training.incumbent.reward:
+            plan = self._evaluator.environment.plan(record.actions[: record.length])
+            training.incumbent = Incumbent(plan, record.reward)
