@@ -194,7 +194,7 @@ class _Gru(torch.autograd.Function):
         return hidden[1:]
 
     @staticmethod
-    @once_differentiable  # type: ignore[untyped-decorator]
+    @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, ...]:
         inputs, weight_ih, weight_hh, gates, hidden, recurrent = ctx.saved_tensors
         steps, rows, h = recurrent.shape
@@ -247,5 +247,5 @@ def gru(inputs: Tensor, weight_ih: Tensor, weight_hh: Tensor, bias_ih: Tensor, b
     Tensor
         (T, R, H).
     """
-    hidden: Tensor = _Gru.apply(inputs, weight_ih, weight_hh, bias_ih, bias_hh)
+    hidden: Tensor = _Gru.apply(inputs, weight_ih, weight_hh, bias_ih, bias_hh)  # type: ignore[no-untyped-call]
     return hidden
