@@ -48,7 +48,7 @@ class Settings(BaseSettings):
 
     max_body_bytes: int = Field(default=8 * 1024**2, ge=1024, description="Largest request body, in bytes")
     max_checkpoint_bytes: int = Field(
-        default=4 * 1024**2, ge=1024, description="Largest checkpoint the library takes in, in bytes"
+        default=16 * 1024**2, ge=1024, description="Largest checkpoint the library takes in, in bytes"
     )
     max_uavs: int = Field(default=1000, ge=1, description="Most UAVs in a problem")
     max_targets: int = Field(default=2000, ge=1, description="Most rescue areas in a problem")

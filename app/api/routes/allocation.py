@@ -82,8 +82,9 @@ async def allocate(
     )
     preferences = Preferences.of(request.headers.getlist("prefer"))
     patience_s = preferences.patience_s
-    if patience_s != 0:
-        job = await services.jobs.wait(job.id, patience_s)
+    if patience_s == 0:
+        return accepted(job, preferences)
+    job = await services.jobs.wait(job.id, patience_s)
     if patience_s is not None and not job.status.finished:
         return accepted(job, preferences)
     answer = answer_of(job)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import AsyncIterator
 from typing import Annotated
 
+import anyio
 from fastapi import APIRouter, Header, Path, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.responses import JSONResponse
@@ -22,6 +24,7 @@ JobId = Annotated[
     str, Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32])
 ]
 _MAX_EVENT_ID_DIGITS = 18
+_FAREWELL_S = 2.0
 
 
 @router.get(
@@ -74,7 +77,12 @@ async def get_job_events(
     await services.jobs.get(job_id)  # an unknown job is answered before the stream begins
     given = last_event_id or ""
     known = given.isascii() and given.isdigit() and len(given) <= _MAX_EVENT_ID_DIGITS
-    return EventSourceResponse(_events(services.jobs, job_id, int(given) if known else 0))
+    stopping = anyio.Event()
+    return EventSourceResponse(
+        _events(services.jobs, job_id, int(given) if known else 0, stopping),
+        shutdown_event=stopping,
+        shutdown_grace_period=_FAREWELL_S,
+    )
 
 
 @router.delete(
@@ -93,6 +101,22 @@ async def cancel_job(job_id: JobId, services: Served) -> JSONResponse:
     return JSONResponse(job_model(job).model_dump(mode="json"), 200 if job.status.finished else 202)
 
 
-async def _events(jobs: JobService, job_id: str, after: int) -> AsyncIterator[ServerSentEvent]:
-    async for event in jobs.events(job_id, after):
-        yield ServerSentEvent(json.dumps(event.data), event=event.name, id=str(event.id))
+async def _events(
+    jobs: JobService, job_id: str, after: int, stopping: anyio.Event
+) -> AsyncIterator[ServerSentEvent]:
+    """Yield a job's events, until it ends or the server stops: then the response is still completed."""
+    stopped = asyncio.ensure_future(stopping.wait())
+    events = jobs.events(job_id, after)
+    try:
+        while True:
+            newest = asyncio.ensure_future(anext(events, None))
+            await asyncio.wait((newest, stopped), return_when=asyncio.FIRST_COMPLETED)
+            if not newest.done():
+                newest.cancel()
+                return
+            event = newest.result()
+            if event is None:
+                return
+            yield ServerSentEvent(json.dumps(event.data), event=event.name, id=str(event.id))
+    finally:
+        stopped.cancel()

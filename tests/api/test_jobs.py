@@ -1,0 +1,209 @@
+"""Jobs over HTTP: asynchronous answers, polling, event streams, cancelling, retries, a full queue."""
+
+import json
+import threading
+
+import pytest
+from referee import replay
+
+LONG = {"algorithm": "qmix", "parameters": {"n_epochs": 10_000_000, "evaluate_per_epoch": 100}}
+ASYNC = {"Prefer": "respond-async"}
+
+
+def submit(client, problem, **headers):
+    response = client.post("/allocate", json={**problem, **LONG}, headers={**ASYNC, **headers})
+    assert response.status_code == 202, response.text
+    assert response.headers["location"] == f"/jobs/{response.json()['id']}"
+    return response.json()["id"]
+
+
+def events(lines):
+    """The events of a stream, as triples of id, name and data."""
+    fields = {}
+    for line in lines:
+        if line:
+            name, _, value = line.partition(":")
+            fields[name] = value.strip()
+        elif "event" in fields:
+            yield int(fields["id"]), fields["event"], json.loads(fields["data"])
+            fields = {}
+
+
+def until_running(client, job_id):
+    """Wait for the first progress that has a plan."""
+    with client.stream("GET", f"/jobs/{job_id}/events") as stream:
+        for _, _, data in events(stream.iter_lines()):
+            if data["assignment"]:
+                return data
+    raise AssertionError("the job has ended")
+
+
+def test_answer_of_a_job_is_the_answer_of_the_call(client, problem, follow):
+    body = {**problem, "algorithm": "ga", "parameters": {"iteration": 20}}
+    waited = client.post("/allocate", json=body).json()
+    response = client.post("/allocate", json=body, headers=ASYNC)
+
+    job = follow(response.json()["id"])
+
+    assert response.headers["preference-applied"] == "respond-async"
+    assert job["status"] == "succeeded"
+    assert job["kind"] == "allocate"
+    assert job["error"] is None
+    assert job["progress"]["fraction"] == 1.0
+    assert job["created_at"] <= job["started_at"] <= job["finished_at"]
+    result = job["result"]
+    assert result["job_id"] == job["id"]
+    for answer in (waited, result):
+        del answer["job_id"], answer["elapsed_s"]
+    assert result == waited
+
+
+def test_wait_is_bounded(client, problem):
+    response = client.post("/allocate", json={**problem, **LONG}, headers={"Prefer": "wait=1"})
+
+    assert response.status_code == 202
+    assert response.headers["preference-applied"] == "wait=1"
+    client.delete(response.headers["location"])
+
+
+def test_wait_that_is_long_enough_is_answered_at_once(client, problem):
+    body = {**problem, "algorithm": "greedy"}
+
+    response = client.post("/allocate", json=body, headers={"Prefer": "respond-async, wait=30"})
+
+    assert response.status_code == 200
+    assert response.headers["preference-applied"] == "respond-async, wait=30"
+
+
+def test_cancelling_keeps_the_best_plan(client, problem, follow):
+    job_id = submit(client, problem)
+    seen = until_running(client, job_id)
+
+    response = client.delete(f"/jobs/{job_id}")
+    job = follow(job_id)
+
+    assert response.status_code in (200, 202)
+    assert job["status"] == "cancelled"
+    truth = replay(problem, job["result"]["assignment"])
+    assert job["result"]["reward"] == pytest.approx(truth["reward"])
+    assert job["result"]["reward"] >= seen["best_reward"]
+    assert client.delete(f"/jobs/{job_id}").status_code == 200
+    assert client.get(f"/jobs/{job_id}").json() == job
+
+
+def test_caller_that_waits_gets_the_best_plan_of_a_cancelled_job(client, problem):
+    before = {job["id"] for job in client.get("/jobs", params={"limit": 100}).json()["jobs"]}
+    answers = []
+    waiting = threading.Thread(
+        target=lambda: answers.append(client.post("/allocate", json={**problem, **LONG}))
+    )
+    waiting.start()
+    job_id = None
+    while job_id is None:
+        found = client.get("/jobs", params={"limit": 1}).json()["jobs"][0]
+        job_id = found["id"] if found["id"] not in before else None
+    until_running(client, job_id)
+
+    client.delete(f"/jobs/{job_id}")
+    waiting.join(30)
+
+    assert answers[0].status_code == 200
+    assert answers[0].json()["job_id"] == job_id
+    replay(problem, answers[0].json()["assignment"])
+
+
+def test_events_go_on_where_they_were_cut_off(client, problem):
+    job_id = submit(client, problem)
+    until_running(client, job_id)
+    client.delete(f"/jobs/{job_id}")
+    with client.stream("GET", f"/jobs/{job_id}/events") as stream:
+        assert stream.headers["content-type"].startswith("text/event-stream")
+        all_of_them = list(events(stream.iter_lines()))
+    last_seen = all_of_them[0][0]
+    with client.stream("GET", f"/jobs/{job_id}/events", headers={"Last-Event-ID": str(last_seen)}) as stream:
+        rest = list(events(stream.iter_lines()))
+
+    ids = [identifier for identifier, _, _ in all_of_them]
+    assert ids == sorted(set(ids))
+    assert [name for _, name, _ in all_of_them[:-1]] == ["progress"] * (len(all_of_them) - 1)
+    assert all_of_them[-1][1] == "end"
+    assert all_of_them[-1][2]["status"] == "cancelled"
+    assert all(0 <= data["fraction"] <= 1 for _, _, data in all_of_them)
+    assert rest == all_of_them[1:]
+
+
+def test_pages_list_every_job_once_newest_first(client, problem):
+    for _ in range(3):
+        client.post("/allocate", json={**problem, "algorithm": "greedy"})
+    everything = client.get("/jobs", params={"limit": 100}).json()
+    assert everything["next_cursor"] is None
+
+    listed, cursor = [], None
+    while True:
+        page = client.get("/jobs", params={"limit": 2, **({"cursor": cursor} if cursor else {})}).json()
+        assert len(page["jobs"]) <= 2
+        listed += page["jobs"]
+        cursor = page["next_cursor"]
+        if cursor is None:
+            break
+
+    assert [job["id"] for job in listed] == [job["id"] for job in everything["jobs"]]
+    created = [job["created_at"] for job in listed]
+    assert created == sorted(created, reverse=True)
+    assert all("result" not in job for job in listed)
+
+
+def test_retry_with_the_same_key_is_the_same_job(client, problem):
+    body = {**problem, "algorithm": "greedy"}
+    key = {"Idempotency-Key": "retry-1"}
+    first = client.post("/allocate", json=body, headers=key)
+
+    again = client.post("/allocate", json={**body, "seed": 123, "max_steps": 5}, headers=key)
+    later = client.post("/allocate", json=body, headers={**key, **ASYNC})
+    other = client.post("/allocate", json={**body, "seed": 1}, headers=key)
+
+    assert first.json() == again.json()
+    assert later.json()["id"] == first.json()["job_id"]
+    assert other.status_code == 422
+    assert other.json()["type"] == "idempotency-key-reused"
+
+
+def test_full_queue_says_when_to_come_back(client, problem):
+    jobs = []
+    refused = None
+    while refused is None:
+        response = client.post("/allocate", json={**problem, **LONG}, headers=ASYNC)
+        if response.status_code == 202:
+            jobs.append(response.json()["id"])
+            assert len(jobs) <= 4, "two workers and two places in the queue"
+        else:
+            refused = response
+    for job_id in jobs:
+        client.delete(f"/jobs/{job_id}")
+
+    assert len(jobs) == 4
+    assert refused.status_code == 429
+    assert refused.json()["type"] == "queue-full"
+    assert int(refused.headers["retry-after"]) >= 1
+
+
+def test_job_that_was_cancelled_before_it_began_has_no_plan(client, problem, follow):
+    running = [submit(client, problem) for _ in range(2)]
+    answers = []
+    waiting = threading.Thread(
+        target=lambda: answers.append(client.post("/allocate", json={**problem, "algorithm": "greedy"}))
+    )
+    waiting.start()
+    queued = None
+    while queued is None:
+        newest = client.get("/jobs", params={"limit": 1}).json()["jobs"][0]
+        queued = newest["id"] if newest["id"] not in running else None
+    for job_id in (queued, *running):
+        client.delete(f"/jobs/{job_id}")
+    waiting.join(30)
+    for job_id in running:
+        follow(job_id)
+
+    assert answers[0].status_code == 409
+    assert answers[0].json()["type"] == "job-cancelled"
+    assert answers[0].json()["job_id"] == queued

@@ -1,0 +1,175 @@
+"""The service as a whole: health, request ids, restarts, its description, what its process does not load."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.api.openapi_examples import ALLOCATION_EXAMPLES, REGISTRATION_EXAMPLES, SIMILAR_EXAMPLES
+
+ROOT = Path(__file__).parents[2]
+ASYNC = {"Prefer": "respond-async"}
+# A clean end is followed by the signal that asked for it, as a shell expects.
+ENDED = (0, -signal.SIGTERM)
+LONG = {"algorithm": "qmix", "parameters": {"n_epochs": 10_000_000}}
+
+
+def test_alive_and_ready(client):
+    assert client.get("/healthz").json()["status"] == "ok"
+    ready = client.get("/readyz").json()
+    assert ready["status"] == "ready"
+    assert ready["workers"] == 2
+    assert 1 <= ready["workers_ready"] <= 2
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/nothing", "/allocate", "/openapi.json", "/jobs", "/docs"])
+def test_every_response_has_a_request_id(client, path):
+    given = client.get(path, headers={"X-Request-ID": "trace-7f"})
+    made = client.get(path)
+    hostile = client.get(path, headers={"X-Request-ID": "a b<script>"})
+
+    assert given.headers["x-request-id"] == "trace-7f"
+    assert re.fullmatch("[0-9a-f]{32}", made.headers["x-request-id"])
+    assert re.fullmatch("[0-9a-f]{32}", hostile.headers["x-request-id"])
+
+
+def test_web_process_loads_neither_torch_nor_compiled_code():
+    program = (
+        "import sys, json, app.api.application as a, app.settings as s\n"
+        "a.create_application(s.Settings()).openapi()\n"
+        "from app.solvers.registry import ALGORITHMS, parse_parameters\n"
+        "[parse_parameters(name, {}) for name in ALGORITHMS]\n"
+        "print(json.dumps(sorted({name.partition('.')[0] for name in sys.modules})))"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
+    )
+
+    loaded = set(json.loads(done.stdout))
+    assert {"fastapi", "sqlalchemy", "numpy"} <= loaded
+    assert not {"torch", "numba", "llvmlite"} & loaded
+
+
+def test_restart_keeps_jobs_and_library_and_goes_on_with_what_ran(start_service, problem):
+    before = start_service(workers=1, max_checkpoint_bytes=10**6).await_ready()
+    quick = {**problem, "algorithm": "qmix", "parameters": {"n_epochs": 4, "buffer_size": 2, "batch_size": 2}}
+    answer = before.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json()
+    policy = before.client.post("/library", json={"name": "kept", "job_id": answer["job_id"]}).json()
+    job = before.client.get(f"/jobs/{answer['job_id']}").json()
+    running = before.client.post("/allocate", json={**problem, **LONG}, headers=ASYNC).json()["id"]
+    waiting = before.client.post("/allocate", json={**problem, "algorithm": "greedy"}, headers=ASYNC).json()[
+        "id"
+    ]
+    before.stop(signal.SIGKILL)
+
+    after = start_service(workers=1).await_ready()
+
+    assert after.client.get(f"/jobs/{answer['job_id']}").json() == job
+    assert after.client.get(f"/library/{policy['id']}").json() == policy
+    assert after.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json() == answer
+    after.client.delete(f"/jobs/{running}")
+    states = {}
+    for identifier in (running, waiting):
+        with after.client.stream("GET", f"/jobs/{identifier}/events") as stream:
+            for _ in stream.iter_lines():
+                pass
+        states[identifier] = after.client.get(f"/jobs/{identifier}").json()["status"]
+    assert states == {running: "cancelled", waiting: "succeeded"}
+    assert after.stop() in ENDED
+
+
+def test_clean_stop_ends_open_streams(start_service, problem):
+    service = start_service(workers=1).await_ready()
+    job_id = service.client.post("/allocate", json={**problem, **LONG}, headers=ASYNC).json()["id"]
+    with service.client.stream("GET", f"/jobs/{job_id}/events") as stream:
+        lines = stream.iter_lines()
+        next(lines)
+        service.process.send_signal(signal.SIGTERM)
+        for _ in lines:
+            pass
+    assert service.process.wait(20) in ENDED
+
+
+def test_start_without_workers_yet_is_not_ready_but_takes_jobs(start_service, problem):
+    service = start_service(workers=1)
+    response = None
+    while response is None:
+        response = service.client.get("/readyz")
+    assert response.status_code in (200, 503)
+    if response.status_code == 503:
+        assert response.json()["type"] == "not-ready"
+        assert response.headers["retry-after"] == "1"
+
+    answer = service.client.post("/allocate", json={**problem, "algorithm": "greedy"})
+
+    assert answer.status_code == 200
+
+
+def test_description_is_complete(client):
+    description = client.get("/openapi.json").json()
+    expected = {
+        "allocate": ("post", "/allocate"),
+        "list_algorithms": ("get", "/algorithms"),
+        "register_policy": ("post", "/library"),
+        "list_policies": ("get", "/library"),
+        "find_similar": ("post", "/library/similar"),
+        "get_policy": ("get", "/library/{policy_id}"),
+        "get_checkpoint": ("get", "/library/{policy_id}/checkpoint"),
+        "delete_policy": ("delete", "/library/{policy_id}"),
+        "list_jobs": ("get", "/jobs"),
+        "get_job": ("get", "/jobs/{job_id}"),
+        "get_job_events": ("get", "/jobs/{job_id}/events"),
+        "cancel_job": ("delete", "/jobs/{job_id}"),
+        "get_health": ("get", "/healthz"),
+        "get_readiness": ("get", "/readyz"),
+        "list_examples": ("get", "/examples"),
+        "get_example": ("get", "/examples/{name}"),
+    }
+    operations = {
+        operation["operationId"]: (method, path)
+        for path, methods in description["paths"].items()
+        for method, operation in methods.items()
+    }
+    assert expected.items() <= operations.items()
+    for methods in description["paths"].values():
+        for operation in methods.values():
+            assert operation["summary"]
+            assert operation["description"]
+            for status, response in operation["responses"].items():
+                assert response["description"]
+                if int(status) >= 400:
+                    assert list(response["content"]) == ["application/problem+json"], operation["operationId"]
+    assert "HTTPValidationError" not in json.dumps(description)
+    references = set(re.findall(r'"#/components/schemas/([^"]+)"', json.dumps(description)))
+    assert references <= set(description["components"]["schemas"])
+    assert "ProblemDetails" in references
+
+
+def test_description_has_an_example_for_each_algorithm(client):
+    description = client.get("/openapi.json").json()
+    algorithms = {item["name"] for item in client.get("/algorithms").json()["algorithms"]}
+
+    def examples(path):
+        return description["paths"][path]["post"]["requestBody"]["content"]["application/json"]["examples"]
+
+    assert set(examples("/allocate")) == algorithms == set(ALLOCATION_EXAMPLES)
+    assert set(examples("/library")) == {"checkpoint", "train", "job_id"} == set(REGISTRATION_EXAMPLES)
+    similar = client.post("/library/similar", json=SIMILAR_EXAMPLES["paper"]["value"])
+    assert similar.status_code == 200
+
+
+def test_documentation_page_loads_nothing_from_elsewhere(client):
+    assert client.get("/").headers["location"] == "/docs"
+    page = client.get("/docs").text
+    loaded = re.findall(r'(?:src|href)="([^"]+)"', page)
+
+    assert len(loaded) == 3
+    for place in loaded:
+        assert place.startswith("/docs/assets/")
+        assert client.get(place).status_code == 200
+    assert "/openapi.json" in page

@@ -1,0 +1,41 @@
+"""Settings: each documented, read from the environment by its name, refused when it makes no sense."""
+
+import re
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from app.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_setting_is_in_the_table_of_the_readme():
+    rows = re.findall(r"^\|\s*`(ALLOCATOR_\w+)`\s*\|", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
+
+    assert sorted(rows) == sorted(f"ALLOCATOR_{name.upper()}" for name in Settings.model_fields)
+
+
+def test_environment_sets_them(monkeypatch, tmp_path):
+    monkeypatch.setenv("ALLOCATOR_DATA_DIR", str(tmp_path))
+    monkeypatch.setenv("ALLOCATOR_PORT", "1234")
+    settings = Settings()
+
+    assert settings.port == 1234
+    assert settings.resolved_database_url == f"sqlite:///{tmp_path}/allocator.sqlite3"
+
+
+def test_database_url_comes_before_the_data_folder(tmp_path):
+    settings = Settings(data_dir=tmp_path, database_url="sqlite:////elsewhere/x.db")
+
+    assert settings.resolved_database_url == "sqlite:////elsewhere/x.db"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("workers", 0), ("port", 65_536), ("max_uavs", 0), ("job_grace_s", -1), ("job_grace_s", "nan")],
+)
+def test_nonsense_is_refused(name, value):
+    with pytest.raises(ValidationError):
+        Settings(**{name: value})
