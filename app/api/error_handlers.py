@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import compile_path
 
 from app.api.errors import RequestError
 from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
@@ -95,7 +96,19 @@ def _http_error(request: Request, error: Exception) -> Response:
         404: f"there is nothing at {_instance(request)}",
         405: f"{request.method} is not possible at {_instance(request)}",
     }.get(status.value, str(error.detail))
-    return problem_response(code, detail, _instance(request), headers=error.headers)
+    headers = dict(error.headers or {})
+    if status is HTTPStatus.METHOD_NOT_ALLOWED and (methods := _methods_at(request)):
+        headers["Allow"] = ", ".join(methods)
+    return problem_response(code, detail, _instance(request), headers=headers)
+
+
+def _methods_at(request: Request) -> list[str]:
+    """List the methods of a place; the router names those of one route only, where several share it."""
+    methods: set[str] = set()
+    for template, operations in request.app.openapi()["paths"].items():
+        if compile_path(template)[0].match(request.url.path):
+            methods |= {method.upper() for method in operations}
+    return sorted(methods)
 
 
 def _request_error(request: Request, error: Exception) -> Response:

@@ -123,11 +123,11 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
 
 def warm_up() -> None:
     """Load and compile what every kind of job needs, so that nobody waits for it later."""
+    # Floats throughout, as requests have them: an array of integers would be compiled for apart.
+    at, home = (1.0, 2.0), (0.0, 0.0)
     problem = Problem(
-        uavs=tuple(
-            UAV(f"uav-{i}", x_s=0, y_s=0, x_c=0, y_c=0, speed=1, voyage=10, loadlist=(2, 1)) for i in (1, 2)
-        ),
-        targets=tuple(Target(f"area-{j}", x=1, y=j, level=1, loadlist=(1, 2), deadline=9) for j in (1, 2, 3)),
+        uavs=tuple(UAV(f"uav-{i}", *home, *home, 1.0, 10.0, (2.0, 1.0)) for i in (1, 2)),
+        targets=tuple(Target(f"area-{j}", *at, 9.0, (1.0, 2.0), deadline=9.0) for j in (1, 2, 3)),
         max_steps=2,
     )
     payload = {"problem": problem_to_record(problem), "seed": 0, "library_url": None}

@@ -264,3 +264,6 @@ def test_page_size(client, path, limit):
 
 def test_method_not_allowed_says_what_is(client):
     assert client.put("/allocate").headers["allow"] == "POST"
+    assert client.put("/library").headers["allow"] == "GET, POST"
+    assert client.put("/jobs/x").headers["allow"] == "DELETE, GET"
+    assert set(client.delete("/docs").headers["allow"].split(", ")) == {"GET", "HEAD"}

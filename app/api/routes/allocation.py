@@ -16,7 +16,7 @@ from app.api.openapi_examples import ALLOCATION_EXAMPLES
 from app.api.preferences import Preferences
 from app.api.problem_details import responses
 from app.api.problem_models import to_problem
-from app.api.routes.headers import LOCATION, IdempotencyKey, Prefer
+from app.api.routes.parameters import LOCATION, IdempotencyKey, Prefer
 from app.api.services import Served
 from app.domain.records import problem_to_record
 from app.solvers.registry import parse_parameters

@@ -15,6 +15,7 @@ from starlette.responses import JSONResponse
 from app.api.job_models import JobList, JobModel, job_list, job_model
 from app.api.library_models import JOB_ID_PATTERN
 from app.api.problem_details import responses
+from app.api.routes.parameters import Cursor
 from app.api.services import Served
 from app.jobs.service import JobService
 
@@ -36,7 +37,7 @@ _FAREWELL_S = 2.0
 async def list_jobs(
     services: Served,
     limit: Annotated[int, Query(ge=1, le=100, description="Jobs a page")] = 20,
-    cursor: Annotated[str | None, Query(description="`next_cursor` of the page before")] = None,
+    cursor: Cursor = None,
 ) -> JobList:
     """List the jobs, newest first, without their results. New jobs do not shift the pages that follow."""
     return job_list(await services.jobs.list(limit, cursor))

@@ -28,7 +28,7 @@ from app.api.openapi_examples import REGISTRATION_EXAMPLES, SIMILAR_EXAMPLES
 from app.api.problem_details import responses
 from app.api.problem_models import to_problem
 from app.api.registration import checkpoint_payload, job_payload, training_payload
-from app.api.routes.headers import LOCATION, IdempotencyKey
+from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey
 from app.api.services import Served
 from app.library.description import description_space, task_description
 
@@ -109,7 +109,7 @@ async def register_policy(
 def list_policies(
     services: Served,
     limit: Annotated[int, Query(ge=1, le=100, description="Policies a page")] = 20,
-    cursor: Annotated[str | None, Query(description="`next_cursor` of the page before")] = None,
+    cursor: Cursor = None,
 ) -> PolicyList:
     """List the source policies, newest first, without their tasks."""
     return policy_list(services.library.page(limit, cursor))

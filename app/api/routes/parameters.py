@@ -1,10 +1,10 @@
-"""Request headers that several routes read, and response headers that they document."""
+"""Parameters that several routes read, and headers that they document."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import Header
+from fastapi import Header, Query
 
 IdempotencyKey = Annotated[
     str | None,
@@ -21,6 +21,13 @@ Prefer = Annotated[
     Header(
         description="RFC 7240: `respond-async` answers 202 at once, `wait=N` after N seconds at most",
         examples=["respond-async"],
+    ),
+]
+Cursor = Annotated[
+    str | None,
+    Query(
+        description="`next_cursor` of the page before",
+        json_schema_extra={"pattern": "^[0-9]{1,18}$"},
     ),
 ]
 

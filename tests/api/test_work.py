@@ -1,0 +1,135 @@
+"""What workers do, called as they call it: progress, stopping, checkpoints, a warm-up that leaves nothing."""
+
+import base64
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from referee import replay
+
+from app.api.openapi_examples import example_problem
+from app.domain.errors import InvalidCheckpoint
+from app.domain.problem import Objective, Problem
+from app.domain.records import problem_from_record, problem_to_record
+from app.jobs import work
+from app.jobs.work_context import CANCEL, WorkContext, new_control
+
+ROOT = Path(__file__).parents[2]
+QMIX = {"n_epochs": 50, "buffer_size": 4, "batch_size": 4, "evaluate_per_epoch": 5}
+
+
+def record(name="paper-5x10"):
+    """An example as a record, with every default filled in."""
+    given = example_problem(name)
+    uavs = [{"dis": 0.0, "ret": 0, "x_c": u["x_s"], "y_c": u["y_s"], **u} for u in given["uavs"]]
+    targets = [{"deadline": None, "service_time": 0.0, **t} for t in given["targets"]]
+    objective = {"distance_weight": None, "return_to_base": True, "charge_return": False}
+    objective |= given.get("objective", {})
+    return {
+        "uavs": uavs,
+        "targets": targets,
+        "max_steps": given["max_steps"],
+        "crs": given.get("crs", "local"),
+        "objective": objective,
+    }
+
+
+def payload(algorithm, parameters, problem=None):
+    return {
+        "problem": problem or record(),
+        "algorithm": algorithm,
+        "parameters": parameters,
+        "seed": 1,
+        "library_url": None,
+    }
+
+
+def test_result_is_json_and_progress_ends_at_its_plan():
+    told = []
+    context = WorkContext.in_process(told.append)
+
+    done = work.allocate(payload("qmix", QMIX), context)
+
+    assert json.loads(json.dumps(done.result, allow_nan=False)) == json.loads(json.dumps(done.result))
+    assert done.artifact
+    assert told
+    best = [progress.best_reward for progress in told]
+    assert best == sorted(best)
+    assert all(replay(record(), progress.assignment)["reward"] == pytest.approx(progress.best_reward)
+               for progress in told)  # fmt: skip
+    assert done.result["reward"] >= best[-1] - 1e-12
+
+
+@pytest.mark.parametrize(("algorithm", "parameters"), [("greedy", {}), ("ga", {}), ("qmix", QMIX)])
+def test_stopped_before_it_began_there_is_still_a_plan(algorithm, parameters):
+    control = new_control()
+    control[CANCEL] = 1.0
+
+    done = work.allocate(payload(algorithm, parameters), WorkContext(lambda _progress: None, control))
+
+    assert done.result["reward"] == pytest.approx(replay(record(), done.result["assignment"])["reward"])
+    assert done.result["reward"] >= 0
+
+
+def test_time_that_is_up_stops_it():
+    context = WorkContext.in_process(lambda _progress: None, time_limit_s=0.2)
+
+    done = work.allocate(payload("qmix", {**QMIX, "n_epochs": 10_000_000}), context)
+
+    assert done.result["history"]["epoch"][-1] < 10_000_000
+    replay(record(), done.result["assignment"])
+
+
+def test_training_is_registered_by_its_checkpoint():
+    trained = work.train(payload("qmix", QMIX), WorkContext.in_process(lambda _progress: None))
+    context = WorkContext.in_process(lambda _progress: None)
+    text = base64.b64encode(trained.artifact).decode()
+    done = work.register({"name": "x", "problem": record(), "checkpoint_base64": text}, context)
+
+    assert done.artifact == trained.artifact
+    with pytest.raises(InvalidCheckpoint, match="base64"):
+        work.register({"name": "x", "problem": record(), "checkpoint_base64": text[:-1]}, context)
+    with pytest.raises(InvalidCheckpoint):
+        work.register({"name": "x", "problem": record("cyclone-idai"), "checkpoint_base64": text}, context)
+
+
+def test_nothing_is_compiled_after_the_warm_up():
+    program = """
+import gc, json, sys
+from numba.core.dispatcher import Dispatcher
+from app.jobs import work
+from app.jobs.work_context import WorkContext
+
+def compiled():
+    return sum(len(each.overloads) for each in gc.get_objects() if isinstance(each, Dispatcher))
+
+work.warm_up()
+before = compiled()
+for payload in json.load(sys.stdin):
+    work.allocate(payload, WorkContext.in_process(lambda progress: None))
+print(before, compiled())
+"""
+    problem = problem_from_record(record())
+    changed = Problem(
+        problem.uavs, problem.targets, 3, objective=Objective(None, return_to_base=False, charge_return=True)
+    )
+    payloads = [
+        payload(algorithm, parameters, each)
+        for each in (record(), record("cyclone-idai"), problem_to_record(changed))
+        for algorithm, parameters in (("greedy", {}), ("ga", {"iteration": 3}), ("qmix", QMIX))
+    ]
+
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        input=json.dumps(payloads),
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        timeout=240,
+    )
+
+    before, after = map(int, done.stdout.split())
+    assert 0 < before == after
