@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
+from importlib.resources.abc import Traversable
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
@@ -15,7 +17,12 @@ _SUFFIX = ".safetensors"
 
 
 def shipped_policies() -> list[NewPolicy]:
-    """Read the policies in the folder ``seed`` beside this module, in the order of their file names.
+    """Read the policies in the folder ``seed`` beside this module; see :func:`read_policies`."""
+    return read_policies(resources.files("app.library") / "seed")
+
+
+def read_policies(folder: Traversable) -> list[NewPolicy]:
+    """Read the policies in a folder, in the order of their file names; none where there is no folder.
 
     A file's name is the policy's id, its metadata has the source task and, under ``name``, a name for
     people.
@@ -23,9 +30,8 @@ def shipped_policies() -> list[NewPolicy]:
     Raises
     ------
     InvalidCheckpoint
-        If a shipped file is damaged.
+        If a file is damaged.
     """
-    folder = resources.files("app.library") / "seed"
     if not folder.is_dir():
         return []
     found = []
@@ -44,9 +50,7 @@ def shipped_policies() -> list[NewPolicy]:
 
 
 def seed_library(library: PolicyLibrary, database: Database) -> int:
-    """Put the shipped policies into an empty library, all of them or none.
-
-    Two processes may do so at the same time: the policies have fixed ids, the second finds them there.
+    """Put the shipped policies into an empty library; see :func:`add_policies`.
 
     Parameters
     ----------
@@ -62,8 +66,21 @@ def seed_library(library: PolicyLibrary, database: Database) -> int:
     """
     if library.count():
         return 0
-    policies = shipped_policies()
+    return add_policies(library, database, shipped_policies())
+
+
+def add_policies(library: PolicyLibrary, database: Database, policies: Sequence[NewPolicy]) -> int:
+    """Put policies with fixed ids into a library, all of them or none.
+
+    Two processes may do so at the same time: the second finds them there.
+
+    Returns
+    -------
+    int
+        How many were not there before.
+    """
+    before = library.count()
     with database.write() as connection:
         for policy in policies:
             library.add(policy, connection)
-    return len(policies)
+    return library.count() - before

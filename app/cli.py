@@ -1,0 +1,205 @@
+"""The command line: start the service, allocate without it, train source tasks."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import uvicorn
+from pydantic import ValidationError
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from app.api.allocation_models import Allocation, AllocationRequest
+from app.api.application import create_application
+from app.api.problem_models import to_problem
+from app.domain.errors import AllocatorError
+from app.domain.records import problem_to_record
+from app.jobs import model
+from app.jobs.work_context import WorkContext
+from app.library.seeding import add_policies, read_policies, seed_library
+from app.settings import Settings
+from app.solvers.registry import parse_parameters
+from policy_store.database import Database
+from policy_store.library import PolicyLibrary
+
+PLAIN_LINE_EVERY_S = 2.0
+"""Seconds between two lines of progress where there is no terminal."""
+
+application = typer.Typer(
+    help="Task allocation of UAV swarms with relief materials.", no_args_is_help=True, add_completion=False
+)
+
+Advance = Callable[[float, str], None]
+"""Takes how much of the total is done, and a word about it."""
+
+Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
+Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
+DataDir = Annotated[Path | None, typer.Option(help="Folder of the database; made where it is missing.")]
+
+
+@application.command()
+def serve(host: Host = None, port: Port = None, data_dir: DataDir = None) -> None:
+    """Start the service with everything that POST /allocate needs."""
+    settings = _settings(host=host, port=port, data_dir=data_dir)
+    uvicorn.run(
+        create_application(settings),
+        host=settings.host,
+        port=settings.port,
+        timeout_graceful_shutdown=int(settings.shutdown_grace_s),
+    )
+
+
+@application.command()
+def allocate(
+    file: Annotated[Path, typer.Argument(help="A request of POST /allocate as JSON; - for standard input.")],
+    algorithm: Annotated[str | None, typer.Option(help="Instead of the request's.")] = None,
+    parameters: Annotated[str | None, typer.Option(help="JSON object, instead of the request's.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Instead of the request's.")] = None,
+    time_limit_s: Annotated[float | None, typer.Option(help="Instead of the request's.")] = None,
+    data_dir: DataDir = None,
+) -> None:
+    """Answer as POST /allocate does, without a server; the answer goes to standard output."""
+    started = time.monotonic()
+    settings = _settings(data_dir=data_dir)
+    with _refusals():
+        body = json.loads(sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8"))
+        given = {"algorithm": algorithm, "seed": seed, "time_limit_s": time_limit_s}
+        body |= {name: value for name, value in given.items() if value is not None}
+        if parameters is not None:
+            body["parameters"] = json.loads(parameters)
+        request = AllocationRequest.model_validate(body)
+        payload = {
+            "problem": problem_to_record(to_problem(request, settings)),
+            "algorithm": request.algorithm,
+            "parameters": parse_parameters(request.algorithm, request.parameters).model_dump(mode="json"),
+            "seed": request.seed,
+            "library_url": settings.resolved_database_url,
+        }
+        with _library(settings) as (library, database):
+            seed_library(library, database)
+        # Loads compiled code and torch, which a call for help or a mistake need not wait for.
+        from app.jobs import work  # noqa: PLC0415
+
+        with _bar(request.algorithm, total=1.0) as advance:
+
+            def report(progress: model.Progress) -> None:
+                advance(progress.fraction, f"best reward {progress.best_reward or 0:.4f}")
+
+            context = WorkContext.in_process(report, time_limit_s=request.time_limit_s)
+            result = work.allocate(payload, context).result
+    answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
+    sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
+
+
+@application.command()
+def train(
+    folder: Annotated[
+        Path | None, typer.Option(help="Write the checkpoints here, instead of registering them.")
+    ] = None,
+    data_dir: DataDir = None,
+    n_epochs: Annotated[int, typer.Option(min=1, help="Epochs of Algorithm 1 a source task.")] = 5000,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = os.cpu_count() or 1,
+) -> None:
+    """Train the source tasks of the paper's sizes and of the bundled examples into a library.
+
+    A run that was interrupted goes on where it stopped.
+    """
+    # Loads torch, which the other commands need not wait for.
+    from app.learning.train_library import source_tasks, train_library  # noqa: PLC0415
+
+    settings = _settings(data_dir=data_dir)
+    target = folder or settings.data_dir / "training"
+    tasks = source_tasks()
+    fractions: dict[str, float] = {}
+    with _bar("source tasks", total=float(len(tasks))) as advance:
+        for progress in train_library(tasks, target, n_epochs, workers):
+            fractions[progress.task.id] = progress.fraction
+            advance(sum(fractions.values()), progress.task.name if progress.finished else "")
+    if folder is None:
+        with _library(settings) as (library, database):
+            added = add_policies(library, database, read_policies(target))
+        typer.echo(f"{added} of {len(tasks)} policies are new in the library", err=True)
+
+
+def _settings(**given: Any) -> Settings:
+    """Read the settings; what the command line gives comes first."""
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})
+    except ValidationError as error:
+        for problem in error.errors(include_url=False):
+            where = ".".join(map(str, problem["loc"]))
+            typer.echo(f"setting {where}: {problem['msg']}", err=True)
+        raise typer.Exit(2) from None
+
+
+@contextmanager
+def _library(settings: Settings) -> Iterator[tuple[PolicyLibrary, Database]]:
+    """Open the policy library of the data folder, made where it is missing."""
+    database = Database(settings.resolved_database_url)
+    try:
+        library = PolicyLibrary(database)
+        library.migrate()
+        yield library, database
+    finally:
+        database.dispose()
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """Say what is wrong with what was given, a line each, and exit with 1."""
+    try:
+        yield
+        return
+    except ValidationError as error:
+        lines = [
+            f"/{'/'.join(map(str, e['loc']))}: {e['msg']}"
+            for e in error.errors(include_url=False, include_input=False)
+        ]
+    except AllocatorError as error:
+        lines = [f"{v.pointer}: {v.detail}" for v in error.violations] or [error.detail]
+    except (OSError, ValueError) as error:
+        lines = [str(error)]
+    for line in lines:
+        typer.echo(line, err=True)
+    raise typer.Exit(1)
+
+
+@contextmanager
+def _bar(title: str, total: float) -> Iterator[Advance]:
+    """Draw a progress bar on a terminal; elsewhere a line from time to time. Both go to standard error."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _PlainLines(title, total)
+        return
+    columns = (
+        TextColumn(title),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done, said: bar.update(task, completed=done, description=said)
+
+
+class _PlainLines:
+    """Progress as lines of text, not more often than every ``PLAIN_LINE_EVERY_S`` seconds."""
+
+    def __init__(self, title: str, total: float) -> None:
+        self._title, self._total = title, total
+        self._next = time.monotonic() + PLAIN_LINE_EVERY_S
+
+    def __call__(self, done: float, said: str) -> None:
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + PLAIN_LINE_EVERY_S
+            typer.echo(f"{self._title}: {100 * done / self._total:.1f} % {said}".rstrip(), err=True)
