@@ -9,7 +9,7 @@ from app.domain.errors import IllegalPlan
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation import simulator
-from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.unmet import unmet_targets
 
 
@@ -56,46 +56,58 @@ def explain(problem: Problem, plan: Plan) -> Allocation:
     # Nobody is sent home in this replay: at its end every UAV is still at its last stop, which is where the
     # leg home begins and where one more visit would begin.
     episodes = simulator.new_episodes(arrays, 1)
-    stops: list[list[Stop]] = [[] for _ in problem.uavs]
-    for s, joint in enumerate(actions):
-        for i, action in enumerate(joint):
-            if action != problem.n_targets:
-                stops[i].append(_visit(problem, arrays, episodes, i, int(action), s + 1))
-    routes = tuple(
-        Route(
-            uav_id=uav.id,
-            distance=sum(stop.distance for stop in stops[i]),
-            return_distance=0.0 if uav.ret else float(simulator.leg_home(arrays, episodes, 0, i)),
-            stops=tuple(stops[i]),
+    legs, arrivals = np.zeros(actions.shape), np.zeros(actions.shape)
+    delivered = np.zeros((*actions.shape, problem.n_materials))
+    return_legs = np.zeros(problem.n_uavs)
+    _trace(arrays, episodes, actions, legs, arrivals, delivered, return_legs)
+    routes = []
+    for i, uav in enumerate(problem.uavs):
+        stops = tuple(
+            Stop(
+                target_id=problem.targets[actions[s, i]].id,
+                step=int(s) + 1,
+                arrival_time=float(arrivals[s, i]),
+                distance=float(legs[s, i]),
+                delivered=tuple(delivered[s, i].tolist()),
+            )
+            for s in np.flatnonzero(actions[:, i] != problem.n_targets)
         )
-        for i, uav in enumerate(problem.uavs)
-    )
+        back = 0.0 if uav.ret else float(return_legs[i])
+        routes.append(Route(uav.id, sum(stop.distance for stop in stops), back, stops))
     return Allocation(
         plan=plan,
         reward=float(result.reward[0]),
         satisfaction=float(result.satisfaction[0]),
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
-        routes=routes,
+        routes=tuple(routes),
         unmet=unmet_targets(problem, arrays, episodes, [len(route.stops) for route in routes]),
     )
 
 
-def _visit(
-    problem: Problem, arrays: ProblemArrays, episodes: simulator.Episodes, i: int, j: int, step: int
-) -> Stop:
-    leg = simulator.leg_to(arrays, episodes, 0, i, j)
-    arrival = episodes.clock[0, i] + leg / arrays.speed[0, i]
-    before = episodes.load[0, i].copy()
-    simulator.act(arrays, episodes, 0, i, j)
-    delivered = before - episodes.load[0, i]
-    return Stop(
-        target_id=problem.targets[j].id,
-        step=step,
-        arrival_time=float(arrival),
-        distance=float(leg),
-        delivered=tuple(float(amount) for amount in delivered),
-    )
+@simulator.compiled
+def _trace(
+    arrays: ProblemArrays,
+    episodes: simulator.Episodes,
+    actions: Actions,
+    legs: Floats,
+    arrivals: Floats,
+    delivered: Floats,
+    return_legs: Floats,
+) -> None:
+    """Fly the visits of a legal plan, and write down every leg, arrival and delivery, then the legs home."""
+    for s in range(actions.shape[0]):
+        for i in range(actions.shape[1]):
+            j = actions[s, i]
+            if j == arrays.level.shape[1]:
+                continue
+            legs[s, i] = simulator.leg_to(arrays, episodes, 0, i, j)
+            arrivals[s, i] = episodes.clock[0, i] + legs[s, i] / arrays.speed[0, i]
+            for k in range(delivered.shape[2]):
+                delivered[s, i, k] = min(episodes.load[0, i, k], episodes.need[0, j, k])
+            simulator.act(arrays, episodes, 0, i, j)
+    for i in range(actions.shape[1]):
+        return_legs[i] = simulator.leg_home(arrays, episodes, 0, i)
 
 
 def _refuse_illegal(problem: Problem, actions: Actions, result: simulator.Replay) -> None:
