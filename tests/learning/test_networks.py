@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 from torch.nn.functional import elu, one_hot
 
 from app.learning.architecture import NetworkSizes, QmixConfig, expected_tensors
+from app.learning.environment import SwarmEnvironment
+from app.learning.episode import Actor
 from app.learning.mixer import Mixer
 from app.learning.networks import QmixNetwork
 
@@ -68,6 +70,27 @@ def test_hidden_state_starts_from_zeros_in_every_episode(agent):
     for b in range(3):
         alone = agent.unroll(states[:, b : b + 1], actions[:, b : b + 1])
         torch.testing.assert_close(together[:, b : b + 1], alone, rtol=1e-4, atol=1e-5)
+
+
+def test_every_episode_of_an_actor_starts_from_zeros(problem, network):
+    """Trap: the same between roll-outs; the values of each are those of its own episode unrolled."""
+    environment, heard = SwarmEnvironment(problem), []
+    step = environment.step
+
+    def listening(values, draws, epsilon, actions):
+        heard.append(values.copy())
+        return step(values, draws, epsilon, actions)
+
+    environment.step = listening
+    actor = Actor(environment, network)
+    for _ in range(3):
+        heard.clear()
+        record = actor.play_greedily()
+        states = torch.from_numpy(record.states[: record.length]).unsqueeze(1)
+        actions = torch.from_numpy(record.actions[: record.length]).unsqueeze(1)
+        unrolled = network.unroll(states, actions)[:, 0].detach().numpy()
+        assert record.length > 1
+        np.testing.assert_allclose(np.array(heard), unrolled, rtol=1e-4, atol=1e-5)
 
 
 def test_last_row_of_actions_is_not_read(agent):

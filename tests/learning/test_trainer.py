@@ -168,6 +168,11 @@ def test_incumbent_is_the_best_of_all_evaluations_and_explorations(problem, netw
         assert reward_of(problem, progress.incumbent) == pytest.approx(progress.best_reward, abs=1e-9)
 
 
+def test_best_plan_may_come_from_exploration(problem, network):
+    training, _ = train(problem, network, QmixParameters(n_epochs=90, evaluate_per_epoch=1000))
+    assert training.incumbent.reward > max(0.0, *training.history.reward)
+
+
 def test_stopping_at_once_evaluates_and_returns_a_legal_plan(problem, network):
     training, _ = train(problem, network, QmixParameters(), stop=lambda: True)
     assert training.epochs == 0
