@@ -1,0 +1,147 @@
+"""Playing episodes with the policy: greedily, or sampling from it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numba import njit
+
+from app.learning.universal.network import UniversalAgent
+from app.learning.universal.observation import (
+    OWN_FEATURES,
+    PAIR_FEATURES,
+    RIVAL_FEATURES,
+    Float32s,
+    Outlook,
+    look,
+    look_again,
+    new_outlook,
+    observe,
+)
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import Episodes, act, end_step, new_episodes
+
+
+class Played(NamedTuple):
+    """B episodes that were played.
+
+    Attributes
+    ----------
+    plans
+        (B, S, M) joint actions; rows after an episode's end send everybody home.
+    rewards
+        (B,)
+    """
+
+    plans: Integers
+    rewards: Floats
+
+
+@torch.inference_mode()
+def play(
+    agent: UniversalAgent,
+    arrays: ProblemArrays,
+    problem: Integers,
+    rng: np.random.Generator | None = None,
+    temperature: float = 1.0,
+) -> Played:
+    """Play one episode of each listed problem, all in lock-step, UAV after UAV.
+
+    Parameters
+    ----------
+    agent
+        The policy.
+    arrays, problem
+        A stack of problems, and (B,) which of them to play.
+    rng
+        Samples actions with these random numbers; greedy where None.
+    temperature
+        Of the sampling; less is greedier.
+    """
+    m, n, _ = arrays.shape
+    batch, steps = len(problem), int(arrays.max_steps.max())
+    episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
+    look(arrays, episodes, outlook)
+    plans = np.full((batch, steps, m), n, np.int64)
+    rewards = np.zeros(batch)
+    scaled = torch.from_numpy((arrays.between / outlook.extent[:, None, None]).astype(np.float32))
+    bias = agent.bias(scaled)
+    hidden = torch.zeros(m, batch, agent.home.shape[0])
+    pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
+    own = np.empty((batch, OWN_FEATURES), np.float32)
+    rivals = np.empty((batch, n, m, RIVAL_FEATURES), np.float32)
+    turn = np.empty(batch, np.int64)
+    single = len(bias) == 1
+    for s in range(steps):
+        for i in range(m):
+            count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn)
+            if not count:
+                continue
+            who = torch.from_numpy(turn[:count])
+            chosen = bias.expand(count, -1, -1, -1) if single else bias[episodes.problem[turn[:count]]]
+            rows = torch.from_numpy(pair[:count])
+            tokens = agent.encode(
+                rows, torch.from_numpy(own[:count]), torch.from_numpy(rivals[:count]), chosen
+            )
+            remembered = agent.remember(tokens, hidden[i, who])
+            hidden[i, who] = remembered
+            logits = agent.logits(agent.values(tokens, remembered))
+            logits[:, :n].masked_fill_(rows[:, :, 0] == 0, -torch.inf)
+            if rng is not None:
+                noise = rng.gumbel(size=logits.shape).astype(np.float32)
+                logits = logits / temperature + torch.from_numpy(noise)
+            _act_turn(
+                arrays, episodes, outlook, i, turn[:count], logits.argmax(dim=1).numpy(), plans[:, s], rewards
+            )
+        _end_steps(arrays, episodes, rewards)
+        if episodes.done.all():
+            break
+    return Played(plans, rewards)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _observe_turn(
+    arrays: ProblemArrays,
+    episodes: Episodes,
+    outlook: Outlook,
+    i: int,
+    pair: Float32s,
+    own: Float32s,
+    rivals: Float32s,
+    turn: Integers,
+) -> int:
+    """Observe for UAV `i` in every episode in which it is out; return how many those are."""
+    count = 0
+    for b in range(episodes.done.shape[0]):
+        if not episodes.done[b] and not episodes.ret[b, i]:
+            observe(arrays, episodes, outlook, b, i, pair[count], own[count], rivals[count])
+            turn[count] = b
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _act_turn(
+    arrays: ProblemArrays,
+    episodes: Episodes,
+    outlook: Outlook,
+    i: int,
+    turn: Integers,
+    actions: Integers,
+    joint: Integers,
+    rewards: Floats,
+) -> None:
+    for q in range(len(turn)):
+        b, action = turn[q], actions[q]
+        joint[b, i] = action
+        rewards[b] += act(arrays, episodes, b, i, action)
+        look_again(arrays, episodes, outlook, b, i, action)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _end_steps(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> None:
+    for b in range(episodes.done.shape[0]):
+        if not episodes.done[b]:
+            rewards[b] += end_step(arrays, episodes, b)

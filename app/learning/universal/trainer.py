@@ -1,0 +1,173 @@
+"""Training the universal policy: demonstrations and own episodes in turn, resumable at any update.
+
+Which shard, which problems and which random numbers an update uses follows from the seed and the update's
+number alone, so a training that was stopped goes on as if it had not been.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+
+from app.learning.universal.architecture import UniversalConfig
+from app.learning.universal.demonstrations import Demonstrations, read_shard
+from app.learning.universal.learner import Batch, Learner, make_batch
+from app.learning.universal.mixer import UniversalMixer
+from app.learning.universal.network import UniversalAgent
+from app.learning.universal.rollout import play
+from app.learning.universal.unfolding import unfold
+from app.simulation.arrays import ProblemArrays
+
+TURN_TOKENS = 32_000
+"""Tokens an update sees, about: turns times targets."""
+
+OWN_EVERY = 16
+"""Every so many updates the policy learns from its own episodes instead of demonstrations."""
+
+TD_EVERY = 4
+"""Every so many updates the TD loss is added; it needs the target networks' values, so it is not cheap."""
+
+SAVE_EVERY = 200
+"""Updates between two states on disk."""
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """How to train.
+
+    Attributes
+    ----------
+    updates
+        Steps of the optimiser.
+    lr
+        Highest learning rate; it rises over the first 200 updates and falls as a half cosine to the end.
+    td_weight
+        Weight of the loss of QMIX beside the cross-entropy.
+    seed
+        Source of all randomness.
+    """
+
+    updates: int
+    lr: float = 2e-3
+    td_weight: float = 0.2
+    seed: int = 123
+
+    def share_of_lr(self, update: int) -> float:
+        """Return what part of the learning rate an update takes."""
+        return min(1.0, (update + 1) / 200) * (0.5 + 0.5 * float(np.cos(np.pi * update / self.updates)))
+
+
+Watch = Callable[[int, dict[str, float]], None]
+
+
+def fit(
+    agent: UniversalAgent,
+    mixer: UniversalMixer,
+    shards: list[Path],
+    schedule: Schedule,
+    state: Path,
+    watch: Watch,
+) -> None:
+    """Train in place.
+
+    Parameters
+    ----------
+    agent, mixer
+        As initialised; replaced by what `state` holds if that exists.
+    shards
+        Files of demonstrations.
+    schedule
+        How long and how.
+    state
+        File that is written every ``SAVE_EVERY`` updates and at the end, and resumed from.
+    watch
+        Told the number of updates done and running means of the losses.
+    """
+    learner = Learner(agent, mixer, lr=schedule.lr, td_weight=schedule.td_weight)
+    done = _resume(learner, state) if state.exists() else 0
+    means: dict[str, float] = {}
+    with ThreadPoolExecutor(1) as ahead:
+        following = ahead.submit(_demonstrated, shards, schedule.seed, done)
+        for update in range(done, schedule.updates):
+            demonstrated = update % OWN_EVERY != OWN_EVERY - 1
+            arrays, batch = following.result()
+            following = ahead.submit(_demonstrated, shards, schedule.seed, update + 1)
+            if not demonstrated:
+                batch = _own(agent, arrays, np.random.default_rng([schedule.seed, update, 1]))
+            losses = learner.update(
+                batch,
+                schedule.share_of_lr(update),
+                imitate=demonstrated,
+                bootstrap=update % TD_EVERY == TD_EVERY - 1,
+            )
+            for name, loss in losses.items():
+                means[name] = 0.98 * means.get(name, loss) + 0.02 * loss
+            if (update + 1) % SAVE_EVERY == 0 or update + 1 == schedule.updates:
+                _save(learner, update + 1, state)
+            watch(update + 1, means)
+
+
+def initial(config: UniversalConfig, seed: int) -> tuple[UniversalAgent, UniversalMixer]:
+    """Make networks with random weights that depend on the seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return UniversalAgent(config.width, config.layers), UniversalMixer(
+            config.width, config.qmix_hidden_dim
+        )
+
+
+@lru_cache(maxsize=256)
+def _read(path: Path) -> Demonstrations:
+    return read_shard(path)
+
+
+def _demonstrated(shards: list[Path], seed: int, update: int) -> tuple[ProblemArrays, Batch]:
+    rng = np.random.default_rng([seed, update, 0])
+    shown = _read(shards[rng.integers(len(shards))])
+    m, n, _ = shown.arrays.shape
+    count = min(len(shown.rewards), max(4, TURN_TOKENS // (2 * m * n)))
+    chosen = rng.choice(len(shown.rewards), count, replace=False)
+    arrays = ProblemArrays(**{name: column[chosen] for name, column in shown.arrays._asdict().items()})
+    turns = unfold(arrays, np.arange(count), shown.plans[chosen])
+    return arrays, make_batch(arrays, turns, torch.device("cpu"))
+
+
+def _own(agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator) -> Batch:
+    problems = np.arange(len(arrays.max_steps))
+    played = play(agent, arrays, problems, rng)
+    return make_batch(arrays, unfold(arrays, problems, played.plans), torch.device("cpu"))
+
+
+def _save(learner: Learner, done: int, path: Path) -> None:
+    tensors = {f"networks.{name}": tensor for name, tensor in learner.networks.state_dict().items()}
+    for number, slots in learner.optimiser.state_dict()["state"].items():
+        tensors |= {f"optimiser.{number}.{name}": tensor for name, tensor in slots.items()}
+    partial = path.with_suffix(".part")
+    save_file(tensors, partial, {"updates": str(done)})
+    os.replace(partial, path)
+
+
+def _resume(learner: Learner, path: Path) -> int:
+    tensors = load_file(path)
+    networks = {
+        name.removeprefix("networks."): t for name, t in tensors.items() if name.startswith("networks.")
+    }
+    learner.networks.load_state_dict(networks, strict=True)
+    slots: dict[int, dict[str, torch.Tensor]] = {}
+    for name, tensor in tensors.items():
+        if name.startswith("optimiser."):
+            _, number, slot = name.split(".")
+            slots.setdefault(int(number), {})[slot] = tensor
+    groups = learner.optimiser.state_dict()["param_groups"]
+    learner.optimiser.load_state_dict({"state": slots, "param_groups": groups})
+    with safe_open(path, framework="pt") as file:
+        return int(file.metadata()["updates"])
