@@ -19,7 +19,7 @@ from sqlalchemy.exc import OperationalError
 from app.jobs.channel import Channels, rung
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor, Outcome, Raised, Returned
-from app.jobs.failure import describe, failure
+from app.jobs.failure import INTERNAL_ERROR, describe, failure
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
 from app.jobs.owner import is_alive
@@ -303,8 +303,8 @@ class Dispatcher:
                 _log.exception("job %s: its result could not be stored", job.id)
                 outcome = Raised(describe(exception), "")
         if isinstance(outcome, Raised):
-            if outcome.traceback:
-                _log.warning("job %s failed: %s\n%s", job.id, outcome.error["detail"], outcome.traceback)
+            if outcome.error["code"] == INTERNAL_ERROR:
+                _log.error("job %s failed: %s\n%s", job.id, outcome.error["detail"], outcome.traceback)
             return await self._write_surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
         if run.killed_for == "stop":
             return await self._write_surely(self._store.release, job.id, job.attempt, progress)

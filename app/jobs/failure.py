@@ -6,6 +6,9 @@ from typing import Any
 
 from app.domain.errors import AllocatorError
 
+INTERNAL_ERROR = "internal-error"
+"""Code of a failure that is a defect, or the machine's trouble."""
+
 
 def failure(code: str, detail: str) -> dict[str, Any]:
     """Return the error object of a failure that has no violations and no further facts."""
@@ -25,4 +28,4 @@ def describe(error: BaseException) -> dict[str, Any]:
             "violations": [{"pointer": v.pointer, "detail": v.detail} for v in error.violations],
             "details": error.details,
         }
-    return failure("internal-error", f"the work ended with {type(error).__name__}: {error}")
+    return failure(INTERNAL_ERROR, f"the work ended with {type(error).__name__}: {error}")
