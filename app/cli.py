@@ -1,4 +1,4 @@
-"""The command line: start the service, allocate without it, train source tasks."""
+"""The command line: start the service and look after it, allocate without it, train source tasks."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+from app.api.access.keys import KeyStore, Role
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.application import create_application
 from app.api.problem_models import to_problem
@@ -36,6 +37,8 @@ PLAIN_LINE_EVERY_S = 2.0
 application = typer.Typer(
     help="Task allocation of UAV swarms with relief materials.", no_args_is_help=True, add_completion=False
 )
+keys = typer.Typer(help="API keys: make, list, revoke.", no_args_is_help=True)
+application.add_typer(keys, name="keys")
 
 Advance = Callable[[float, str], None]
 """Takes how much of the total is done, and a word about it."""
@@ -46,9 +49,27 @@ DataDir = Annotated[Path | None, typer.Option(help="Folder of the database; made
 
 
 @application.command()
-def serve(host: Host = None, port: Port = None, data_dir: DataDir = None) -> None:
+def serve(
+    host: Host = None,
+    port: Port = None,
+    data_dir: DataDir = None,
+    no_keys: Annotated[
+        bool | None,
+        typer.Option("--no-keys", help="Take requests without API keys from everybody.", show_default=False),
+    ] = None,
+) -> None:
     """Start the service with everything that POST /allocate needs."""
-    settings = _settings(host=host, port=port, data_dir=data_dir)
+    settings = _settings(host=host, port=port, data_dir=data_dir, no_keys=no_keys)
+    if settings.always_needs_keys:
+        with _keys(settings) as store:
+            usable = any(key.revoked_at is None for key in store.all())
+        if not usable:
+            typer.echo(
+                f"others can reach {settings.host}, and there is no API key yet: make one with "
+                "`python -m app keys create`, or say --no-keys to serve everybody",
+                err=True,
+            )
+            raise typer.Exit(2)
     uvicorn.run(
         create_application(settings),
         host=settings.host,
@@ -129,6 +150,37 @@ def train(
         typer.echo(f"{added} of {len(tasks)} policies are new in the library", err=True)
 
 
+@keys.command("create")
+def create_key(
+    role: Annotated[Role, typer.Option(help="allocate; or library: policies may be changed too.")],
+    name: Annotated[str, typer.Option(help="Who or what it is for.")],
+    data_dir: DataDir = None,
+) -> None:
+    """Make a key and print it; it is not kept and cannot be shown again."""
+    with _keys(_settings(data_dir=data_dir)) as store:
+        key, token = store.create(name, role)
+    typer.echo(token)
+    typer.echo(f"key {key.id} of the role {role} for {name!r}: this is the only time it is shown", err=True)
+
+
+@keys.command("list")
+def list_keys(data_dir: DataDir = None) -> None:
+    """List the keys without their secrets, a line each, with tabs between id, role, dates and name."""
+    with _keys(_settings(data_dir=data_dir)) as store:
+        for key in store.all():
+            revoked = "in use" if key.revoked_at is None else f"revoked {key.revoked_at:%Y-%m-%d %H:%M}"
+            typer.echo(f"{key.id}\t{key.role}\t{key.created_at:%Y-%m-%d %H:%M}\t{revoked}\t{key.name}")
+
+
+@keys.command("revoke")
+def revoke_key(key_id: Annotated[str, typer.Argument(help="As listed.")], data_dir: DataDir = None) -> None:
+    """Revoke a key; a running service refuses it a second later."""
+    with _keys(_settings(data_dir=data_dir)) as store:
+        if not store.revoke(key_id):
+            typer.echo(f"no key that is in use has the id {key_id!r}", err=True)
+            raise typer.Exit(1)
+
+
 def _settings(**given: Any) -> Settings:
     """Read the settings; what the command line gives comes first."""
     try:
@@ -148,6 +200,18 @@ def _library(settings: Settings) -> Iterator[tuple[PolicyLibrary, Database]]:
         library = PolicyLibrary(database)
         library.migrate()
         yield library, database
+    finally:
+        database.dispose()
+
+
+@contextmanager
+def _keys(settings: Settings) -> Iterator[KeyStore]:
+    """Open the table of keys of the data folder, made where it is missing."""
+    database = Database(settings.resolved_database_url)
+    try:
+        store = KeyStore(database)
+        store.migrate()
+        yield store
     finally:
         database.dispose()
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
@@ -24,6 +25,14 @@ class Settings(BaseSettings):
     data_dir: Path = Field(default=Path("data"), description="Folder of the database; made where missing")
     database_url: str | None = Field(
         default=None, description="SQLAlchemy URL; default: the file `allocator.sqlite3` in the data folder"
+    )
+
+    no_keys: bool = Field(
+        default=False,
+        description="Take requests without API keys from everybody, also on addresses that others can reach",
+    )
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(), description="Origins whose pages may call the service, with commas between them"
     )
 
     workers: int = Field(
@@ -53,6 +62,23 @@ class Settings(BaseSettings):
     max_uavs: int = Field(default=1000, ge=1, description="Most UAVs in a problem")
     max_targets: int = Field(default=2000, ge=1, description="Most rescue areas in a problem")
     max_materials: int = Field(default=64, ge=1, description="Most kinds of material in a problem")
+
+    @field_validator("cors_origins", mode="before")
+    @classmethod
+    def _split(cls, given: object) -> object:
+        if not isinstance(given, str):
+            return given
+        return tuple(origin.strip() for origin in given.split(",") if origin.strip())
+
+    @property
+    def always_needs_keys(self) -> bool:
+        """Whether requests need a key even while none was made: others than this machine can reach it."""
+        if self.no_keys or self.host == "localhost":
+            return False
+        try:
+            return not ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return True
 
     @property
     def resolved_database_url(self) -> str:

@@ -9,13 +9,17 @@ from contextlib import asynccontextmanager
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI
 from starlette.middleware import Middleware
+from starlette.middleware.cors import CORSMiddleware
 
 import app
+from app.api.access.guard import Guard
+from app.api.access.keys import KeyStore
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
 from app.api.job_kinds import job_kinds
 from app.api.json_body import BodyLimit
 from app.api.routes import algorithms, allocation, examples, jobs, library, operations
+from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.jobs.local import LocalExecutor
 from app.jobs.service import JobService
@@ -25,6 +29,16 @@ from policy_store.checkpoint import ContainerLimits
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
 
+_READ_HEADERS = (
+    "Authorization",
+    "Content-Type",
+    "Idempotency-Key",
+    "If-None-Match",
+    "Last-Event-ID",
+    "Prefer",
+    "X-Request-ID",
+)
+_SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
 _WARM_UP = "app.jobs.work:warm_up"
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
@@ -45,7 +59,10 @@ def create_application(settings: Settings) -> FastAPI:
         try:
             store = PolicyLibrary(database, limits)
             store.migrate()
-            seed_library(store, database)
+            # What is shipped is taken in whatever is set for what strangers send.
+            seed_library(PolicyLibrary(database), database)
+            keys = KeyStore(database)
+            keys.migrate()
             service = JobService(
                 database,
                 job_kinds(store, limits),
@@ -55,7 +72,7 @@ def create_application(settings: Settings) -> FastAPI:
                 overrun_grace_s=settings.job_grace_s,
             )
             await service.start()
-            application.state.services = Services(settings, database, store, service)
+            application.state.services = Services(settings, database, store, service, keys)
             try:
                 yield
             finally:
@@ -72,16 +89,31 @@ def create_application(settings: Settings) -> FastAPI:
         redoc_url=None,
         lifespan=lifespan,
         generate_unique_id_function=operation_id,
-        middleware=[
-            Middleware(
-                CorrelationIdMiddleware,
-                validator=lambda given: _REQUEST_ID.fullmatch(given) is not None,
-            ),
-            Middleware(BodyLimit, limit=settings.max_body_bytes),
-        ],
+        middleware=_middleware(settings),
     )
     for room in (allocation, algorithms, jobs, library, examples, operations):
         application.include_router(room.router)
     install_error_handlers(application)
-    install_documentation(application)
+    install_documentation(application, keys_required=settings.always_needs_keys)
     return application
+
+
+def _middleware(settings: Settings) -> list[Middleware]:
+    """List the middleware, outermost first: what adds to every response stands before what refuses."""
+    listed = [
+        Middleware(CorrelationIdMiddleware, validator=lambda given: _REQUEST_ID.fullmatch(given) is not None),
+        Middleware(SecurityHeaders),
+    ]
+    if settings.cors_origins:
+        listed.append(
+            Middleware(
+                CORSMiddleware,
+                allow_origins=settings.cors_origins,
+                allow_methods=["GET", "POST", "DELETE"],
+                allow_headers=_READ_HEADERS,
+                expose_headers=_SENT_HEADERS,
+            )
+        )
+    if not settings.no_keys:
+        listed.append(Middleware(Guard, always=settings.always_needs_keys))
+    return [*listed, Middleware(BodyLimit, limit=settings.max_body_bytes)]

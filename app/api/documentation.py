@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 from typing import Any
 
 from fastapi import FastAPI
@@ -11,7 +14,9 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 from starlette.staticfiles import StaticFiles
 
+from app.api.access.guard import SCHEME, document, needed_role
 from app.api.problem_details import ProblemDetails
+from app.api.security_headers import content_policy
 
 DESCRIPTION = """\
 Who flies where, with what: plans for swarms of UAVs that carry relief materials, after Yin, Guo, Su and Wang,
@@ -19,7 +24,8 @@ Who flies where, with what: plans for swarms of UAVs that carry relief materials
 Drones 2022, 6(8), 215.
 
 Errors are problem details (RFC 9457). Every response has an `X-Request-ID`, which is the request's if it
-has one.
+has one. A service that keys were made for needs one with every request:
+`Authorization: Bearer …`.
 """
 
 TAGS: list[dict[str, Any]] = [
@@ -30,6 +36,7 @@ TAGS: list[dict[str, Any]] = [
 ]
 
 _ASSETS = "/docs/assets"
+_INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 
 def operation_id(route: APIRoute) -> str:
@@ -37,8 +44,8 @@ def operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def install_documentation(application: FastAPI) -> None:
-    """Give an application its ``/docs``, to which ``/`` leads, and errors in its OpenAPI description."""
+def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
+    """Give an application its ``/docs``, to which ``/`` leads, and errors and keys in its description."""
     generate = application.openapi
 
     def openapi() -> dict[str, Any]:
@@ -49,17 +56,25 @@ def install_documentation(application: FastAPI) -> None:
             components = schema["components"]["schemas"]
             components |= problem.pop("$defs")
             components["ProblemDetails"] = problem
+            schema["components"]["securitySchemes"] = {"ApiKey": SCHEME}
+            for path, operations in schema["paths"].items():
+                for method, operation in operations.items():
+                    document(operation, needed_role(method.upper(), path), required=keys_required)
         return schema
 
     async def show_documentation(request: Request) -> HTMLResponse:
         root = request.scope.get("root_path", "").rstrip("/")
-        return get_swagger_ui_html(
+        page = get_swagger_ui_html(
             openapi_url=f"{root}{application.openapi_url}",
             title=application.title,
             swagger_js_url=f"{root}{_ASSETS}/swagger-ui-bundle.js",
             swagger_css_url=f"{root}{_ASSETS}/swagger-ui.css",
             swagger_favicon_url=f"{root}{_ASSETS}/favicon-32x32.png",
         )
+        scripts = _INLINE_SCRIPT.findall(bytes(page.body))
+        hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
+        page.headers["Content-Security-Policy"] = content_policy(hashes)
+        return page
 
     async def lead_to_documentation(request: Request) -> RedirectResponse:
         return RedirectResponse(f"{request.scope.get('root_path', '').rstrip('/')}/docs")

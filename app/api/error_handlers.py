@@ -16,6 +16,7 @@ from starlette.routing import compile_path
 
 from app.api.errors import RequestError
 from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
+from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
 from app.jobs import errors as job_errors
 from policy_store import errors as store_errors
@@ -146,11 +147,11 @@ def _known_error(request: Request, error: Exception) -> Response:
 
 
 def _defect(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs the error
-    # This handler runs outside of the middleware that adds the id to other responses.
+    # This handler runs outside of the middleware that adds these to other responses.
     identifier = correlation_id.get() or ""
     return problem_response(
         "internal-error",
         "the service has a defect or its machine is in trouble; the log has more under this request's id",
         _instance(request),
-        headers={"X-Request-ID": identifier},
+        headers={"X-Request-ID": identifier, **SECURITY_HEADERS},
     )

@@ -8,14 +8,12 @@ from typing import Any
 
 from starlette.responses import JSONResponse
 
+from app.api.access.guard import client
 from app.api.errors import JobCancelled, JobFailed
 from app.api.job_models import job_model, result_of
 from app.api.preferences import Preferences
 from app.jobs.errors import Draining
 from app.jobs.model import Idempotency, Job, JobStatus
-
-_CLIENT = "public"
-"""Whose idempotency keys they are: the service does not tell its clients apart."""
 
 
 def idempotency(
@@ -24,12 +22,12 @@ def idempotency(
     """Make the promise of an ``Idempotency-Key``: the same key comes with the same request only.
 
     What is compared is the request as it was understood, so that a default which is spelled out, or another
-    order of fields, is the same request.
+    order of fields, is the same request. Keys of the service tell its clients apart.
     """
     if key is None:
         return None
     text = json.dumps([kind, payload, time_limit_s], sort_keys=True)
-    return Idempotency(_CLIENT, key, hashlib.sha256(text.encode()).hexdigest())
+    return Idempotency(client.get(), key, hashlib.sha256(text.encode()).hexdigest())
 
 
 def accepted(job: Job, preferences: Preferences | None = None) -> JSONResponse:

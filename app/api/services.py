@@ -7,6 +7,7 @@ from typing import Annotated, cast
 
 from fastapi import Depends, Request
 
+from app.api.access.keys import KeyStore
 from app.jobs.service import JobService
 from app.settings import Settings
 from policy_store.database import Database
@@ -21,6 +22,7 @@ class Services:
     database: Database
     library: PolicyLibrary
     jobs: JobService
+    keys: KeyStore
 
 
 def _services(request: Request) -> Services:

@@ -1,0 +1,1 @@
+"""Who may do what: API keys, their roles, and the guard in front of the routes."""

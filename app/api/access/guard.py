@@ -1,0 +1,138 @@
+"""The guard: middleware that lets through who has a key for what is asked for.
+
+It stands in front of the routes and knows them by method and path, so a new route needs a key unless it is
+named here, and nothing of a request's body is read for somebody who has none.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from contextvars import ContextVar
+from typing import Any
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.api.access.keys import ApiKey, KeyStore, Role, recognise
+from app.api.problem_details import problem_response, responses
+
+OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", "/openapi.json"})
+"""What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""
+
+OPEN_FOLDERS = ("/docs/assets/",)
+
+SCHEME: dict[str, Any] = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "An API key, made by `python -m app keys create`. A key of the role `allocate` is for "
+    "allocations, jobs and reading, one of the role `library` for registering and deleting policies too. "
+    "Without any key made, a service on the loopback interface takes requests from everybody there.",
+}
+
+client: ContextVar[str] = ContextVar("client", default="public")
+"""Id of the key that the present request came with; ``public`` where none is needed."""
+
+_REALM = 'Bearer realm="uav-allocator"'
+_REMEMBERED_S = 1.0
+
+
+def needed_role(method: str, path: str) -> Role | None:
+    """Return the role that a request needs; None where no key is needed.
+
+    Parameters
+    ----------
+    method
+        Upper case.
+    path
+        Of the request, or the template of its route.
+    """
+    if path in OPEN_PATHS or path.startswith(OPEN_FOLDERS):
+        return None
+    reads = method in ("GET", "HEAD") or path == "/library/similar"
+    return Role.LIBRARY if path.startswith("/library") and not reads else Role.ALLOCATE
+
+
+def document(operation: dict[str, Any], role: Role | None, *, required: bool) -> None:
+    """Add to an operation of an OpenAPI description what a key has to do with it.
+
+    Parameters
+    ----------
+    operation
+        Changed in place.
+    role
+        As :func:`needed_role` returns it.
+    required
+        False where the service may be one that needs no keys.
+    """
+    if role is None:
+        return
+    operation["security"] = [{"ApiKey": []}] if required else [{}, {"ApiKey": []}]
+    codes = ("unauthenticated", "forbidden") if role is Role.LIBRARY else ("unauthenticated",)
+    for status, response in responses(*codes).items():
+        operation["responses"].setdefault(str(status), response)
+
+
+class Guard:
+    """Middleware that refuses requests without a key for what they ask.
+
+    Parameters
+    ----------
+    app
+        The application behind it; its state has the services.
+    always
+        True: also while no key was ever made. False: from the first key on.
+    """
+
+    def __init__(self, app: ASGIApp, *, always: bool) -> None:
+        self._app = app
+        self._always = always
+        self._keys: Mapping[str, ApiKey] = {}
+        self._read_at = float("-inf")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, or answer 401 or 403."""
+        role = needed_role(scope["method"], scope["path"]) if scope["type"] == "http" else None
+        if role is None:
+            await self._app(scope, receive, send)
+            return
+        keys = await self._newest(scope["app"].state.services.keys)
+        if not keys and not self._always:
+            await self._app(scope, receive, send)
+            return
+        scheme, _, token = Headers(scope=scope).get("authorization", "").partition(" ")
+        if scheme.lower() != "bearer":
+            refusal = problem_response(
+                "unauthenticated",
+                "this service needs an API key: Authorization: Bearer …",
+                scope["path"],
+                headers={"WWW-Authenticate": _REALM},
+            )
+        elif (key := recognise(token.strip(), keys)) is None:
+            refusal = problem_response(
+                "unauthenticated",
+                "this API key is unknown, or was revoked",
+                scope["path"],
+                headers={"WWW-Authenticate": f'{_REALM}, error="invalid_token"'},
+            )
+        elif not key.role.allows(role):
+            refusal = problem_response(
+                "forbidden",
+                f"this needs a key of the role {role}, key {key.id} has the role {key.role}",
+                scope["path"],
+                headers={"WWW-Authenticate": f'{_REALM}, error="insufficient_scope", scope="{role}"'},
+            )
+        else:
+            client.set(key.id)
+            await self._app(scope, receive, send)
+            return
+        await refusal(scope, receive, send)
+
+    async def _newest(self, store: KeyStore) -> Mapping[str, ApiKey]:
+        """Return the keys as they were at most a second ago: another process makes and revokes them."""
+        if time.monotonic() - self._read_at > _REMEMBERED_S:
+            read_at = time.monotonic()
+            self._keys = {key.id: key for key in await asyncio.to_thread(store.all)}
+            self._read_at = read_at
+        return self._keys

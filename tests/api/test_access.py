@@ -1,0 +1,270 @@
+"""API keys: who gets in, with what answer, and that a service others can reach is never open by accident."""
+
+import asyncio
+import base64
+import hashlib
+import re
+
+import httpx
+import pytest
+
+from app.api.access.guard import needed_role
+from app.api.access.keys import KeyStore, Role, metadata, recognise
+from app.api.application import create_application
+from app.api.services import Services
+from app.jobs.local import LocalExecutor
+from app.jobs.service import JobService
+from app.jobs.store import JobStore
+from app.settings import Settings
+from policy_store.database import Database
+from policy_store.library import PolicyLibrary
+
+UNKNOWN = "f" * 12 + "." + "A" * 43
+
+
+@pytest.fixture
+def keys(tmp_path):
+    database = Database(f"sqlite:///{tmp_path / 'allocator.sqlite3'}")
+    store = KeyStore(database)
+    store.migrate()
+    yield store
+    database.dispose()
+
+
+class Caller:
+    """Calls an application in this process that has its database, and no workers."""
+
+    def __init__(self, settings, database):
+        self.app = create_application(settings)
+        jobs = JobService(database, [], LocalExecutor(1))
+        self.app.state.services = Services(
+            settings, database, PolicyLibrary(database), jobs, KeyStore(database)
+        )
+
+    def request(self, method, path, **options):
+        async def call():
+            transport = httpx.ASGITransport(self.app, raise_app_exceptions=False)
+            async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
+                return await client.request(method, path, **options)
+
+        return asyncio.run(call())
+
+    def get(self, path, **options):
+        return self.request("GET", path, **options)
+
+    def post(self, path, **options):
+        return self.request("POST", path, **options)
+
+    def delete(self, path, **options):
+        return self.request("DELETE", path, **options)
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Makes applications on one data folder."""
+    database = Database(f"sqlite:///{tmp_path / 'allocator.sqlite3'}")
+    KeyStore(database).migrate()
+    PolicyLibrary(database).migrate()
+    JobStore(database, "host:1:1:me", 1).migrate()
+    yield lambda **settings: Caller(Settings(data_dir=tmp_path, **settings), database)
+    database.dispose()
+
+
+def bearer(token):
+    return {"Authorization": f"Bearer {token}"}
+
+
+def test_the_table_is_what_the_migration_makes(keys, tmp_path):
+    database = Database(f"sqlite:///{tmp_path / 'allocator.sqlite3'}")
+    with database.read() as connection:
+        columns = connection.exec_driver_sql("PRAGMA table_info(api_keys)").all()
+    database.dispose()
+    assert [row[1] for row in columns] == [column.name for column in metadata.tables["api_keys"].columns]
+
+
+def test_a_key_is_kept_as_the_digest_of_32_random_bytes(keys, tmp_path):
+    key, token = keys.create("ambulance", Role.ALLOCATE)
+    _, other = keys.create("ambulance", Role.ALLOCATE)
+    key_id, _, secret = token.partition(".")
+
+    assert key_id == key.id
+    assert len(base64.urlsafe_b64decode(secret + "=")) == 32
+    assert token != other
+    assert keys.all()[0] == key
+    assert key.digest == hashlib.sha256(secret.encode()).digest()
+    for file in tmp_path.iterdir():
+        assert secret.encode() not in file.read_bytes()
+
+
+def test_only_the_whole_key_is_recognised(keys):
+    key, token = keys.create("ambulance", Role.ALLOCATE)
+    known = {key.id: key}
+
+    assert recognise(token, known) == key
+    for wrong in (
+        "",
+        ".",
+        key.id,
+        key.id + ".",
+        token[:-1],
+        token + "A",
+        "." + token,
+        token.swapcase(),
+        UNKNOWN,
+    ):
+        assert recognise(wrong, known) is None
+    assert keys.revoke(key.id)
+    assert not keys.revoke(key.id)
+    assert recognise(token, {each.id: each for each in keys.all()}) is None
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "role"),
+    [
+        ("GET", "/healthz", None),
+        ("GET", "/readyz", None),
+        ("GET", "/docs", None),
+        ("GET", "/docs/assets/swagger-ui.css", None),
+        ("GET", "/metrics", Role.ALLOCATE),
+        ("POST", "/allocate", Role.ALLOCATE),
+        ("DELETE", "/jobs/0", Role.ALLOCATE),
+        ("GET", "/library", Role.ALLOCATE),
+        ("HEAD", "/library", Role.ALLOCATE),
+        ("GET", "/library/x/checkpoint", Role.ALLOCATE),
+        ("POST", "/library/similar", Role.ALLOCATE),
+        ("POST", "/library", Role.LIBRARY),
+        ("POST", "/library/", Role.LIBRARY),
+        ("DELETE", "/library/similarly-named", Role.LIBRARY),
+        ("PATCH", "/library/x", Role.LIBRARY),
+        ("GET", "/a-route-of-tomorrow", Role.ALLOCATE),
+    ],
+)
+def test_what_needs_which_role(method, path, role):
+    assert needed_role(method, path) is role
+
+
+def test_roles_are_held(keys, start):
+    _, allocate = keys.create("dispatcher", Role.ALLOCATE)
+    _, library = keys.create("trainer", Role.LIBRARY)
+    client = start()
+
+    for open_path in ("/healthz", "/docs", "/openapi.json"):
+        assert client.get(open_path).status_code == 200
+    for headers in ({}, {"Authorization": allocate}, {"Authorization": f"Basic {allocate}"}):
+        answer = client.post("/allocate", content=b"not read", headers=headers)
+        assert (answer.status_code, answer.json()["type"]) == (401, "unauthenticated")
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert answer.headers["www-authenticate"] == 'Bearer realm="uav-allocator"'
+        assert answer.headers["x-request-id"]
+    answer = client.get("/jobs", headers=bearer(UNKNOWN))
+    assert answer.status_code == 401
+    assert 'error="invalid_token"' in answer.headers["www-authenticate"]
+
+    assert client.get("/jobs", headers=bearer(allocate)).status_code == 200
+    assert client.get("/jobs", headers={"Authorization": f"bearer   {library}"}).status_code == 200
+    refused = client.delete("/library/nobody", headers=bearer(allocate))
+    assert (refused.status_code, refused.json()["type"]) == (403, "forbidden")
+    assert 'scope="library"' in refused.headers["www-authenticate"]
+    assert client.delete("/library/nobody", headers=bearer(library)).status_code == 404
+    assert client.post("/library", json={}, headers=bearer(library)).status_code == 422
+
+
+def test_the_first_key_closes_a_running_service_and_revoking_it_does_not_open_it(keys, start, monkeypatch):
+    now = [1000.0]
+    monkeypatch.setattr("app.api.access.guard.time.monotonic", lambda: now[0])
+    client = start()
+    assert client.get("/jobs").status_code == 200
+
+    key, token = keys.create("first", Role.ALLOCATE)
+    now[0] += 1.1
+    assert client.get("/jobs").status_code == 401
+    assert client.get("/jobs", headers=bearer(token)).status_code == 200
+
+    keys.revoke(key.id)
+    now[0] += 1.1
+    assert client.get("/jobs", headers=bearer(token)).status_code == 401
+    assert client.get("/jobs").status_code == 401
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.7", "dispatch.example"])
+def test_where_others_can_come_a_key_is_needed_before_there_is_one(start, host):
+    assert start(host=host).get("/jobs").status_code == 401
+    assert start(host=host, no_keys=True).get("/jobs").status_code == 200
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "localhost"])
+def test_the_loopback_is_recognised(host):
+    assert not Settings(host=host).always_needs_keys
+
+
+def test_keys_are_in_the_description(start):
+    def operation(client, method, path):
+        return client.get("/openapi.json").json()["paths"][path][method]
+
+    local, public = start(), start(host="0.0.0.0")
+    schemes = public.get("/openapi.json").json()["components"]["securitySchemes"]
+
+    assert schemes["ApiKey"]["scheme"] == "bearer"
+    assert operation(public, "post", "/allocate")["security"] == [{"ApiKey": []}]
+    assert operation(local, "post", "/allocate")["security"] == [{}, {"ApiKey": []}]
+    assert {"401", "403"} <= operation(public, "post", "/library")["responses"].keys()
+    assert "401" in operation(public, "get", "/jobs")["responses"]
+    assert "security" not in operation(public, "get", "/healthz")
+
+
+@pytest.mark.parametrize(
+    "path", ["/healthz", "/docs", "/docs/assets/swagger-ui.css", "/nothing", "/openapi.json"]
+)
+def test_every_response_has_security_headers(client, path):
+    headers = client.get(path).headers
+
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["x-frame-options"] == "DENY"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+
+
+def test_a_defect_is_answered_with_security_headers(start):
+    client = start()
+    client.app.state.services = None
+    answer = client.get("/jobs")
+
+    assert answer.status_code == 500
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert re.fullmatch("[0-9a-f]{32}", answer.headers["x-request-id"])
+
+
+def test_the_documentation_page_may_run_its_script_and_no_other(client):
+    page = client.get("/docs")
+    policy = page.headers["content-security-policy"]
+    inline = re.findall(r"<script>(.*?)</script>", page.text, re.DOTALL)
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in inline]
+
+    assert len(inline) == 1
+    assert re.search("script-src ([^;]*);", policy)[1].split() == ["'self'", f"'sha256-{hashes[0]}'"]
+    assert not re.search(r"\son\w+=", page.text)
+
+
+def test_pages_of_other_origins_may_call_only_where_that_is_set(client, start):
+    asked = {
+        "Origin": "https://dispatch.example",
+        "Access-Control-Request-Method": "POST",
+        "Access-Control-Request-Headers": "authorization,content-type",
+    }
+    assert "access-control-allow-origin" not in client.get("/healthz", headers=asked).headers
+    open_to_one = start(cors_origins="https://dispatch.example, https://other.example", host="0.0.0.0")
+
+    preflight = open_to_one.request("OPTIONS", "/allocate", headers=asked)
+    assert preflight.status_code == 200
+    assert preflight.headers["access-control-allow-origin"] == "https://dispatch.example"
+    refused = open_to_one.post("/allocate", headers={"Origin": "https://dispatch.example"})
+    assert refused.status_code == 401
+    assert refused.headers["access-control-allow-origin"] == "https://dispatch.example"
+    stranger = open_to_one.get("/healthz", headers={"Origin": "https://stranger.example"})
+    assert "access-control-allow-origin" not in stranger.headers
+
+
+def test_origins_come_from_the_environment_with_commas(monkeypatch):
+    monkeypatch.setenv("ALLOCATOR_CORS_ORIGINS", "https://a.example,https://b.example")
+
+    assert Settings().cors_origins == ("https://a.example", "https://b.example")
