@@ -21,6 +21,7 @@ from app.api.access.keys import KeyStore, Role
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.application import create_application
 from app.api.problem_models import to_problem
+from app.api.receipt_deadline import protocol_with_deadline
 from app.domain.errors import AllocatorError
 from app.domain.records import problem_to_record
 from app.jobs import model
@@ -74,6 +75,7 @@ def serve(
         create_application(settings),
         host=settings.host,
         port=settings.port,
+        http=protocol_with_deadline(settings.receive_timeout_s),
         timeout_graceful_shutdown=int(settings.shutdown_grace_s),
     )
 

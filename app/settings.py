@@ -55,6 +55,12 @@ class Settings(BaseSettings):
         default=3, ge=1, description="How often a job is tried whose worker or server died; then it fails"
     )
 
+    receive_timeout_s: float = Field(
+        default=20.0,
+        gt=0,
+        allow_inf_nan=False,
+        description="Seconds a client has to send a request; then it gets 408, and its connection is closed",
+    )
     max_body_bytes: int = Field(default=8 * 1024**2, ge=1024, description="Largest request body, in bytes")
     max_checkpoint_bytes: int = Field(
         default=16 * 1024**2, ge=1024, description="Largest checkpoint the library takes in, in bytes"

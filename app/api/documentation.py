@@ -15,7 +15,7 @@ from starlette.responses import HTMLResponse, RedirectResponse
 from starlette.staticfiles import StaticFiles
 
 from app.api.access.guard import SCHEME, document, needed_role
-from app.api.problem_details import ProblemDetails
+from app.api.problem_details import ProblemDetails, responses
 from app.api.security_headers import content_policy
 
 DESCRIPTION = """\
@@ -60,6 +60,9 @@ def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
             for path, operations in schema["paths"].items():
                 for method, operation in operations.items():
                     document(operation, needed_role(method.upper(), path), required=keys_required)
+                    if "requestBody" in operation:
+                        timeout = {str(k): v for k, v in responses("request-timeout").items()}
+                        operation["responses"] = timeout | operation["responses"]
         return schema
 
     async def show_documentation(request: Request) -> HTMLResponse:

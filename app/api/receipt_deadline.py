@@ -1,0 +1,109 @@
+"""What the server lacks for clients that do not play by the rules: a deadline, and problem details.
+
+A client that sends its request byte by byte, or nothing at all, would hold its connection for ever. What is
+timed is the receipt alone: an answer may take as long as it likes, and a connection that rests between two
+requests is the keep-alive timer's. What is no HTTP at all is answered like every other error.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from http import HTTPStatus
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from app.api.problem_details import problem_response
+from app.api.security_headers import SECURITY_HEADERS
+
+
+def protocol_with_deadline(seconds: float) -> type[H11Protocol]:
+    """Return a protocol class for ``uvicorn.Config(http=…)``.
+
+    Parameters
+    ----------
+    seconds
+        From the opening of the connection, or from the first byte of a later request, to its last byte. Who
+        has sent a part by then gets 408, who has sent nothing is not answered; both are closed.
+    """
+
+    class DeadlineProtocol(_DeadlineProtocol):
+        receive_timeout_s = seconds
+
+    return DeadlineProtocol
+
+
+class _DeadlineProtocol(H11Protocol):
+    receive_timeout_s: float
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._arm()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._disarm()
+        super().connection_lost(exc)
+
+    def handle_events(self) -> None:
+        super().handle_events()
+        if self._receives():
+            self._arm()
+        else:
+            self._disarm()
+
+    def _receives(self) -> bool:
+        """Say whether a request has begun to arrive and has not ended."""
+        if self.transport.is_closing():
+            return False
+        state = self.conn.their_state
+        return state is h11.SEND_BODY or (state is h11.IDLE and bool(self.conn.trailing_data[0]))
+
+    def _arm(self) -> None:
+        if self._deadline is None:
+            self._deadline = self.loop.call_later(self.receive_timeout_s, self._expire)
+
+    def _disarm(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+    def _expire(self) -> None:
+        self._deadline = None
+        if self.transport.is_closing():
+            return
+        if self._receives():
+            self._answer(
+                "request-timeout", f"the request was not received within {self.receive_timeout_s:g} s"
+            )
+        self.logger.info("a request was not received within %g s", self.receive_timeout_s)
+        if self.cycle is not None and not self.cycle.response_complete:
+            # Whoever reads the body learns that there is no more of it, and what they answer is not sent.
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+        self.transport.close()
+
+    def send_400_response(self, msg: str) -> None:
+        self._answer("bad-request", msg)
+        self.transport.close()
+
+    def _answer(self, code: str, detail: str) -> None:
+        """Answer a request that is not complete, unless it has an answer."""
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
+            return
+        path = self.scope["path"] if self.conn.our_state is h11.SEND_RESPONSE else ""
+        refusal = problem_response(
+            code,
+            detail,
+            path,
+            headers={**SECURITY_HEADERS, "X-Request-ID": uuid.uuid4().hex, "Connection": "close"},
+        )
+        phrase = HTTPStatus(refusal.status_code).phrase.encode()
+        head = h11.Response(status_code=refusal.status_code, headers=refusal.raw_headers, reason=phrase)
+        for event in (head, h11.Data(data=bytes(refusal.body)), h11.EndOfMessage()):
+            self.transport.write(self.conn.send(event) or b"")
