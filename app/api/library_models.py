@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
@@ -78,6 +78,11 @@ class SimilarRequest(WireModel):
 
     task: ProblemModel = Field(description="The task to find similar source tasks for")
     k: int = Field(default=5, ge=1, le=100, description="How many at most")
+    similarity: Literal["summary", "paper"] = Field(
+        default="summary",
+        description="summary: by what the tasks have in common, whatever their sizes; paper: Algorithm 2, "
+        "number by number, which only finds tasks of the same size",
+    )
 
 
 class CheckpointModel(AnswerModel):
@@ -121,13 +126,15 @@ class SimilarPolicy(AnswerModel):
     """A source policy and how far its task is."""
 
     policy: PolicySummary
-    distance: float = Field(description="Sum of squared differences between the task descriptions")
+    distance: float = Field(
+        description="Sum of squared differences between the tasks' summaries or descriptions"
+    )
 
 
 class SimilarList(AnswerModel):
     """Similar source tasks."""
 
-    similar: list[SimilarPolicy] = Field(description="Nearest first; tasks of the same size only")
+    similar: list[SimilarPolicy] = Field(description="Nearest first")
 
 
 def policy_summary(policy: Policy) -> PolicySummary:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 QMIX_PAPER_1 = "qmix-paper-1"
 """Architecture: a shared DRQN agent and a monotonic mixing network, for one M, N and K."""
@@ -81,17 +80,31 @@ class QmixConfig:
         ValueError
             If a field is missing, unknown, no integer, or out of range.
         """
-        names = cls.__slots__
-        if not isinstance(record, Mapping) or set(record) != set(names):
-            raise ValueError(f"config has not exactly the fields {', '.join(names)}")
-        for name in names:
-            value = record[name]
-            if type(value) is not int or not 1 <= value <= _MAX_DIMENSION:
-                raise ValueError(
-                    f"config field {name} is {value!r}, not an integer from 1 to {_MAX_DIMENSION}"
-                )
-        fields: dict[str, Any] = dict(record)
-        return cls(**fields)
+        return cls(**read_config(record, dict.fromkeys(cls.__slots__, _MAX_DIMENSION)))
+
+
+def read_config(record: object, largest: Mapping[str, int]) -> dict[str, int]:
+    """Read the sizes of networks from what a stranger may have written.
+
+    Parameters
+    ----------
+    record
+        Anything.
+    largest
+        The fields there must be, with the largest value of each; the smallest is 1.
+
+    Raises
+    ------
+    ValueError
+        If a field is missing, unknown, no integer, or out of range.
+    """
+    if not isinstance(record, Mapping) or set(record) != set(largest):
+        raise ValueError(f"config has not exactly the fields {', '.join(largest)}")
+    for name, limit in largest.items():
+        value = record[name]
+        if type(value) is not int or not 1 <= value <= limit:
+            raise ValueError(f"config field {name} is {value!r}, not an integer from 1 to {limit}")
+    return {name: record[name] for name in largest}
 
 
 def expected_tensors(config: QmixConfig) -> dict[str, tuple[tuple[int, ...], str]]:

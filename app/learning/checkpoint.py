@@ -9,11 +9,10 @@ finiteness, and only then a network is built.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import torch
 from safetensors.torch import load, save
 from torch import Tensor
@@ -22,10 +21,14 @@ import app
 from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
-from app.learning.architecture import PAPER_FEATURES_1, QMIX_PAPER_1, QmixConfig, expected_tensors
+from app.learning import architecture as paper
+from app.learning.architecture import QmixConfig
 from app.learning.environment import SwarmEnvironment
 from app.learning.episode import EpisodeRecord
 from app.learning.networks import QmixNetwork
+from app.learning.universal import architecture as universal
+from app.learning.universal.architecture import UniversalConfig
+from app.learning.universal.policy import UniversalPolicy, values_of_greedy_plan
 from app.solvers.protocol import Parameters
 from policy_store.checkpoint import read_container, require_finite, require_tensors
 from policy_store.errors import InvalidContainer
@@ -34,6 +37,12 @@ FORMAT = 1
 """Version of the metadata's fields."""
 
 _METADATA_KEY = "checkpoint"
+
+_CHECKED_UAVS, _CHECKED_TARGETS = 16, 32
+"""How much of a task a policy for every size is tried on."""
+
+Config = QmixConfig | UniversalConfig
+Network = QmixNetwork | UniversalPolicy
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,20 +59,47 @@ class Checkpoint:
         The networks, with its weights.
     """
 
-    config: QmixConfig
+    config: Config
     metadata: Mapping[str, Any]
-    network: QmixNetwork
+    network: Network
+
+
+@dataclass(frozen=True, slots=True)
+class Architecture:
+    """What the codec must know of an architecture.
+
+    Attributes
+    ----------
+    features
+        Version of the network inputs.
+    config
+        Class of the sizes; its ``from_record`` bounds them.
+    tensors
+        Shape and type of every tensor, from the sizes.
+    build
+        Makes the networks, from the sizes.
+    values
+        Makes one forward pass on a task, from the networks and their sizes, and returns all values that come
+        out.
+    """
+
+    features: str
+    config: type[Config]
+    tensors: Callable[[Any], Mapping[str, tuple[tuple[int, ...], str]]]
+    build: Callable[[Any], Network]
+    values: Callable[[Any, Any, Problem], Sequence[Tensor]]
 
 
 def encode(
-    network: QmixNetwork,
+    network: Network,
     *,
-    config: QmixConfig,
+    config: Config,
     task: Problem,
     algorithm: str,
     seed: int,
     parameters: Parameters,
     metrics: Mapping[str, float | int],
+    **more: object,
 ) -> bytes:
     """Write networks and what made them.
 
@@ -75,11 +111,15 @@ def encode(
         What was trained on what, and how.
     metrics
         What came of it: ``reward`` of the best plan, ``epochs``, and more.
+    more
+        What else the metadata says, JSON-ready: ``name``, ``families`` it was trained on.
     """
+    name = next(name for name, known in ARCHITECTURES.items() if isinstance(config, known.config))
     metadata = {
+        **more,
         "format": FORMAT,
-        "architecture": QMIX_PAPER_1,
-        "features": PAPER_FEATURES_1,
+        "architecture": name,
+        "features": ARCHITECTURES[name].features,
         "config": config.as_record(),
         "algorithm": algorithm,
         "task": problem_to_record(task),
@@ -120,15 +160,18 @@ def read_metadata(data: bytes) -> dict[str, Any]:
         raise InvalidCheckpoint(f"its metadata {_METADATA_KEY!r} is not JSON") from error
     if not isinstance(metadata, dict):
         raise InvalidCheckpoint(f"its metadata has no JSON object under {_METADATA_KEY!r}")
-    for field, known in (
-        ("format", FORMAT),
-        ("architecture", QMIX_PAPER_1),
-        ("features", PAPER_FEATURES_1),
-    ):
-        value = metadata.get(field)
-        if type(value) is not type(known) or value != known:
-            raise InvalidCheckpoint(f"its {field} is {value!r}, this version reads {known!r}")
+    _require(metadata, "format", [FORMAT])
+    _require(metadata, "architecture", list(ARCHITECTURES))
+    _require(metadata, "features", [ARCHITECTURES[metadata["architecture"]].features])
     return metadata
+
+
+def _require(metadata: Mapping[str, Any], field: str, known: Sequence[object]) -> None:
+    value = metadata.get(field)
+    if not any(type(value) is type(each) and value == each for each in known):
+        raise InvalidCheckpoint(
+            f"its {field} is {value!r}, this version reads {' and '.join(map(repr, known))}"
+        )
 
 
 def decode(data: bytes) -> Checkpoint:
@@ -140,14 +183,15 @@ def decode(data: bytes) -> Checkpoint:
         If anything in it is not exactly as its architecture needs it.
     """
     metadata = read_metadata(data)
+    known = ARCHITECTURES[metadata["architecture"]]
     try:
-        config = QmixConfig.from_record(metadata.get("config"))
+        config = known.config.from_record(metadata.get("config"))
         container = read_container(data)
-        require_tensors(container, expected_tensors(config))
+        require_tensors(container, known.tensors(config))
         require_finite(data, container)
     except (ValueError, InvalidContainer) as error:
         raise InvalidCheckpoint(str(error)) from error
-    network = QmixNetwork(config.sizes, config.drqn_hidden_dim, config.qmix_hidden_dim)
+    network = known.build(config)
     network.load_state_dict(load(data), strict=True)
     return Checkpoint(config, metadata, network)
 
@@ -168,7 +212,18 @@ def verify(data: bytes, problem: Problem) -> None:
         If it cannot be read, has networks for another size, or values of the task that are not finite.
     """
     checkpoint = decode(data)
-    config = checkpoint.config
+    known = ARCHITECTURES[checkpoint.metadata["architecture"]]
+    values = known.values(checkpoint.network, checkpoint.config, problem)
+    if not all(each.isfinite().all() for each in values):
+        raise InvalidCheckpoint("its networks give values of the task that are not finite")
+
+
+def _build_paper(config: QmixConfig) -> QmixNetwork:
+    return QmixNetwork(config.sizes, config.drqn_hidden_dim, config.qmix_hidden_dim)
+
+
+def _paper_values(network: QmixNetwork, config: QmixConfig, problem: Problem) -> Sequence[Tensor]:
+    """Q values and Q_tot of the first step."""
     sizes = (problem.n_uavs, problem.n_targets, problem.n_materials)
     if (config.n_uavs, config.n_targets, config.n_materials) != sizes:
         raise InvalidCheckpoint(
@@ -180,7 +235,26 @@ def verify(data: bytes, problem: Problem) -> None:
     environment.observe(record.states[0], record.allowed[0])
     with torch.inference_mode():
         states = torch.from_numpy(record.states)  # (1, D)
-        values, _ = checkpoint.network.step(states, None, None)
-        total = checkpoint.network.mix(values.amax(dim=-1), states)
-    if not (np.isfinite(values.numpy()).all() and np.isfinite(total.numpy()).all()):
-        raise InvalidCheckpoint("its networks give values of the task that are not finite")
+        values, _ = network.step(states, None, None)
+        return values, network.mix(values.amax(dim=-1), states)
+
+
+def _universal_values(network: UniversalPolicy, _: UniversalConfig, problem: Problem) -> Sequence[Tensor]:
+    """Q values and Q_tot of the greedy rule's plan; a part of the task will do, since every size fits."""
+    part = replace(problem, uavs=problem.uavs[:_CHECKED_UAVS], targets=problem.targets[:_CHECKED_TARGETS])
+    return values_of_greedy_plan(network, part)
+
+
+ARCHITECTURES: Mapping[str, Architecture] = {
+    paper.QMIX_PAPER_1: Architecture(
+        paper.PAPER_FEATURES_1, QmixConfig, paper.expected_tensors, _build_paper, _paper_values
+    ),
+    universal.QMIX_UNIVERSAL_1: Architecture(
+        universal.UNIVERSAL_FEATURES_1,
+        UniversalConfig,
+        universal.expected_tensors,
+        UniversalPolicy,
+        _universal_values,
+    ),
+}
+"""The architectures by name."""

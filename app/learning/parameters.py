@@ -6,23 +6,26 @@ public QMIX implementations whose parameter names the paper uses.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from app.solvers.protocol import Parameters
 
 MAX_EPOCHS = 10_000_000
 MAX_STORED_EPISODES = 100_000
 MAX_HIDDEN_UNITS = 1024
+MAX_SAMPLES = 100_000
+MAX_MOVES = 10_000_000_000
+
+TABLE_3_EPOCHS = 200
+
+Mode = Literal["service", "paper"]
 
 
-class LearningParameters(Parameters):
-    """What every learner has: Table 1's schedule, and the decisions it leaves open."""
+class UpdateParameters(Parameters):
+    """How a learner plays, stores and updates: Table 1, and the decisions it leaves open."""
 
-    n_epochs: int = Field(
-        default=50_000, ge=0, le=MAX_EPOCHS, description="Epochs; one episode and one update each (Table 1)"
-    )
     evaluate_per_epoch: int = Field(
         default=100,
         ge=1,
@@ -67,10 +70,18 @@ class LearningParameters(Parameters):
         return min(self.learning_starts or self.buffer_size, self.buffer_size)
 
 
+class LearningParameters(UpdateParameters):
+    """What every learner from scratch has."""
+
+    n_epochs: int = Field(
+        default=50_000, ge=0, le=MAX_EPOCHS, description="Epochs; one episode and one update each (Table 1)"
+    )
+
+
 class QmixParameters(LearningParameters):
     """Table 1 of the paper."""
 
-    mode: Literal["service", "paper"] = Field(
+    mode: Mode = Field(
         default="service",
         description="paper: Algorithm 1 to the letter; service: the service's own best, the same for now",
     )
@@ -82,18 +93,48 @@ class QmixParameters(LearningParameters):
     )
 
 
-class TransferQmixParameters(QmixParameters):
-    """Table 3 of the paper; exploration begins where a trained policy's ends."""
+class TransferQmixParameters(UpdateParameters):
+    """Table 3 of the paper, and what the service's own mode adds.
 
-    mode: Literal["service", "paper"] = Field(
+    Exploration begins where a trained policy's ends. The service's mode has no use for the replay buffer,
+    epsilon, the period of the target network and the hidden units: its policies bring their own.
+    """
+
+    mode: Mode = Field(
         default="service",
-        description="paper: Algorithm 2 to the letter; service: the service's own best, the same for now",
+        description="service: one policy for every size, search and fine-tuning at request time; paper: "
+        "Algorithm 2 to the letter, from a source task of the same size",
     )
-    n_epochs: int = Field(
-        default=200,
+    source: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=128,
+        description="Library id of the policy to transfer; null: in service mode the best of the nearest "
+        "few, in paper mode the one of the most similar source task",
+    )
+    samples: int | None = Field(
+        default=None,
+        ge=0,
+        le=MAX_SAMPLES,
+        description="Sampled roll-outs beside the greedy one; 0 is the bare greedy roll-out; null: 64, fewer "
+        "for large problems. Service mode only",
+    )
+    n_epochs: int | None = Field(
+        default=None,
         ge=0,
         le=MAX_EPOCHS,
-        description="Epochs of fine-tuning; one episode and at most one update each (Table 3); 0: none",
+        description="Epochs of fine-tuning; 0: none; null: 200 in paper mode (Table 3), by size in service "
+        "mode",
+    )
+    polish: bool | None = Field(
+        default=None,
+        description="Local search from the best plan found; null: true. Service mode only",
+    )
+    polish_moves: int | None = Field(
+        default=None,
+        ge=0,
+        le=MAX_MOVES,
+        description="Moves of that local search; null: by size. Service mode only",
     )
     evaluate_per_epoch: int = Field(
         default=1, ge=1, le=MAX_EPOCHS, description="Epochs from one greedy evaluation to the next (Table 3)"
@@ -107,12 +148,27 @@ class TransferQmixParameters(QmixParameters):
     epsilon_start: float = Field(
         default=0.05, ge=0, le=1, description="Probability of a random action at the beginning"
     )
-    source: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=128,
-        description="Library id of the policy to transfer; null: the one of the most similar source task",
+    drqn_hidden_dim: int = Field(
+        default=64, ge=1, le=MAX_HIDDEN_UNITS, description="Hidden units of the agent network (Table 3)"
     )
+    qmix_hidden_dim: int = Field(
+        default=32, ge=1, le=MAX_HIDDEN_UNITS, description="Hidden units of the mixing network (Table 3)"
+    )
+
+    @model_validator(mode="after")
+    def _paper_mode_has_no_search(self) -> Self:
+        if self.mode == "paper":
+            for name in ("samples", "polish", "polish_moves"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name} belongs to service mode; in paper mode leave it out")
+        return self
+
+    def table_3(self) -> QmixParameters:
+        """Return what Algorithm 1 is run with in paper mode."""
+        given = {name: getattr(self, name) for name in QmixParameters.model_fields}
+        return QmixParameters(
+            **{**given, "n_epochs": TABLE_3_EPOCHS if self.n_epochs is None else self.n_epochs}
+        )
 
 
 class DqnParameters(LearningParameters):

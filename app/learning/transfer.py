@@ -1,34 +1,44 @@
-"""Transfer-QMIX (Algorithm 2): the most similar source task's networks, fine-tuned by Algorithm 1."""
+"""Transfer-QMIX: a source policy of the library, carried over to a problem.
+
+In paper mode Algorithm 2: the networks of the most similar source task of the same size, fine-tuned by
+Algorithm 1. In service mode :mod:`app.learning.universal.transfer`.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+from typing import cast
 
 import numpy as np
 
-from app.domain.errors import InvalidParameters, NoCompatibleSource, Violation
 from app.domain.problem import Problem
-from app.learning.architecture import QMIX_PAPER_1, QmixConfig
-from app.learning.checkpoint import Checkpoint, decode, encode
+from app.learning.checkpoint import encode
+from app.learning.networks import QmixNetwork
 from app.learning.parameters import TransferQmixParameters
 from app.learning.qmix import metrics_of, qmix_config, require_memory, train
 from app.learning.random_streams import random_streams
+from app.learning.source_policies import Source, SourcePolicies
 from app.learning.threads import one_thread
-from app.library.description import description_space, task_description
-from app.solvers.protocol import Report, Solution, SolverContext, SourcePolicy, StopCriterion
-from policy_store.database import Database
-from policy_store.errors import PolicyNotFound
-from policy_store.library import PolicyLibrary
-from policy_store.similarity import squared_distances
+from app.learning.universal.best_plan import BestPlan
+from app.learning.universal.effort import effort
+from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.polishing import polish
+from app.learning.universal.transfer import UniversalTransfer, fill_in
+from app.simulation.arrays import compile_problem
+from app.solvers.greedy import greedy_plan
+from app.solvers.protocol import Progress, Report, Solution, SolverContext, StopCriterion
+
+_TUNING_SHARE = 0.5
+"""Of the progress, where a local search follows the fine-tuning of a policy for one size."""
 
 
 class TransferQmix:
-    """Copies the most similar source policy of the library and fine-tunes it on the problem.
+    """Carries a source policy of the library over to the problem.
 
     Parameters
     ----------
     parameters
-        Table 3.
+        Table 3, and what service mode adds.
     context
         Its library is where the source policies are.
     """
@@ -45,98 +55,87 @@ class TransferQmix:
         Raises
         ------
         NoCompatibleSource
-            If the library has no policy for the same M, N, K and hidden units; ``details["sizes"]`` has the
-            sizes there are.
+            If the library has no policy that fits: in paper mode for the same M, N, K and hidden units, in
+            service mode for every size. ``details["sizes"]`` has the sizes there are.
         InvalidParameters
             If the `source` asked for does not exist or does not fit.
         ProblemTooLarge
             If fine-tuning would not fit into memory.
         """
-        parameters = self._parameters
-        config = qmix_config(problem, parameters)
-        require_memory(parameters, config.sizes, problem.max_steps, parameters.drqn_hidden_dim)
-        source, checkpoint = self._source(problem, config)
-        streams = random_streams(seed)
+        parameters, policies = self._parameters, SourcePolicies(self._context.library_url)
+        config = qmix_config(problem, parameters.table_3())
         with one_thread():
-            network = checkpoint.network
-            training = train(problem, network, parameters, streams, stop, report, count_updates=True)
-            learned = encode(
-                network,
-                config=config,
-                task=problem,
-                algorithm="transfer_qmix",
-                seed=seed,
-                parameters=parameters,
-                metrics=metrics_of(training),
-            )
-        return Solution(training.incumbent.plan, training.history, parameters, source, learned)
-
-    def _source(self, problem: Problem, config: QmixConfig) -> tuple[SourcePolicy, Checkpoint]:
-        if self._context.library_url is None:
-            raise _no_source(problem, "there is no library", [])
-        database = Database(self._context.library_url)
-        try:
-            library = PolicyLibrary(database)
-            if self._parameters.source is not None:
-                return _asked_for(library, self._parameters.source, problem, config)
-            return _nearest(library, problem, config)
-        finally:
-            database.dispose()
+            if parameters.mode == "paper":
+                if parameters.source is None:
+                    source = policies.most_similar(problem, config)
+                else:
+                    source = policies.asked_for(parameters.source, problem, config=config, any_size=False)
+                return _fine_tune(problem, source, parameters, seed, stop, report)
+            if parameters.source is None:
+                sources = policies.shortlist(problem)
+            else:
+                sources = [policies.asked_for(parameters.source, problem, config=config, any_size=True)]
+            if isinstance(sources[0].checkpoint.network, UniversalPolicy):
+                return UniversalTransfer(problem, parameters, seed, stop, report).run(sources)
+            return _fine_tune_and_polish(problem, sources[0], parameters, seed, stop, report)
 
 
-def _nearest(library: PolicyLibrary, problem: Problem, config: QmixConfig) -> tuple[SourcePolicy, Checkpoint]:
-    """Lines 1 to 6 of Algorithm 2, among the policies whose networks have this shape."""
-    space, description = description_space(problem), task_description(problem)
-    asked, neighbours = 1, library.nearest(space, description, 1, QMIX_PAPER_1)
-    while True:
-        for neighbour in neighbours:
-            policy = neighbour.policy
-            if policy.metadata.get("config") == config.as_record():
-                source = SourcePolicy(policy.id, policy.name, neighbour.distance)
-                return source, decode(library.checkpoint(policy.id))
-        if len(neighbours) < asked:
-            break
-        # The nearest have other hidden units, which only requests that change the defaults meet.
-        asked *= 8
-        neighbours = library.nearest(space, description, asked, QMIX_PAPER_1)
-    sizes = library.sizes(QMIX_PAPER_1)
-    if neighbours:
-        reason = f"none has {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
-    else:
-        reason = "the library has " + (", ".join(f"{m}x{n}x{k}" for m, n, k in sizes) or "none at all")
-    raise _no_source(problem, reason, sizes)
-
-
-def _asked_for(
-    library: PolicyLibrary, policy_id: str, problem: Problem, config: QmixConfig
-) -> tuple[SourcePolicy, Checkpoint]:
-    try:
-        policy = library.get(policy_id)
-        space = description_space(problem)
-        vector = library.vectors(policy_id).get(space)
-        checkpoint = decode(library.checkpoint(policy_id)) if policy.architecture == QMIX_PAPER_1 else None
-    except PolicyNotFound:
-        raise _bad_source(f"there is no policy {policy_id!r} in the library") from None
-    if checkpoint is None or checkpoint.config != config or vector is None:
-        raise _bad_source(
-            f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "
-            f"{_size(problem)} with {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
-        )
-    query = task_description(problem).astype(np.float32)
-    distance = float(squared_distances(vector[None], query)[0])
-    return SourcePolicy(policy.id, policy.name, distance), checkpoint
-
-
-def _size(item: Any) -> str:
-    return f"{item.n_uavs}x{item.n_targets}x{item.n_materials}"
-
-
-def _no_source(problem: Problem, reason: str, sizes: list[tuple[int, int, int]]) -> NoCompatibleSource:
-    return NoCompatibleSource(
-        f"no source policy for {_size(problem)} (UAVs x targets x materials): {reason}",
-        details={"sizes": [list(size) for size in sizes]},
+def _fine_tune(
+    problem: Problem,
+    source: Source,
+    parameters: TransferQmixParameters,
+    seed: int,
+    stop: StopCriterion,
+    report: Report,
+) -> Solution:
+    """Line 7 of Algorithm 2: copy the parameters of the source task, then Algorithm 1."""
+    used = parameters.table_3()
+    config = qmix_config(problem, used)
+    require_memory(used, config.sizes, problem.max_steps, used.drqn_hidden_dim)
+    network = copy.deepcopy(cast(QmixNetwork, source.checkpoint.network))
+    training = train(problem, network, used, random_streams(seed), stop, report, count_updates=True)
+    parameters = parameters.model_copy(update={"n_epochs": used.n_epochs})
+    learned = encode(
+        network,
+        config=config,
+        task=problem,
+        algorithm="transfer_qmix",
+        seed=seed,
+        parameters=parameters,
+        metrics=metrics_of(training),
     )
+    return Solution(training.incumbent.plan, training.history, parameters, source.policy, learned)
 
 
-def _bad_source(detail: str) -> InvalidParameters:
-    return InvalidParameters(detail, [Violation("/parameters/source", detail)])
+def _fine_tune_and_polish(
+    problem: Problem,
+    source: Source,
+    parameters: TransferQmixParameters,
+    seed: int,
+    stop: StopCriterion,
+    report: Report,
+) -> Solution:
+    """Service mode from a policy for one size: fine-tuned the paper's way, polished as any other."""
+    arrays = compile_problem(problem)
+    used = fill_in(parameters.model_copy(update={"samples": 0}), effort(arrays))
+    share = _TUNING_SHARE if used.polish_moves else 1.0
+
+    def tell(progress: Progress) -> None:
+        report(Progress(share * progress.fraction, progress.epoch, progress.best_reward, progress.incumbent))
+
+    tuned = _fine_tune(problem, source, used.parameters, seed, stop, tell)
+    best = BestPlan(arrays)
+    best.consider(tuned.plan.as_array()[None])
+    if not used.is_bare:
+        best.consider(greedy_plan(problem).as_array()[None])
+    epochs = tuned.history.epoch[-1]
+    polish(
+        arrays,
+        best,
+        used.polish_moves,
+        np.random.default_rng([abs(seed), int(seed < 0)]),
+        stop,
+        lambda done: report(Progress(share + (1 - share) * done, epochs, best.reward, best.plan)),
+    )
+    learned = tuned.checkpoint if used.n_epochs else None
+    return Solution(best.plan, tuned.history, used.parameters, source.policy, learned)

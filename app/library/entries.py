@@ -9,6 +9,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
 from app.library.description import description_space, task_description
+from app.library.summary import SUMMARY_SPACE, task_summary
 from policy_store.checkpoint import ContainerLimits, read_container
 from policy_store.errors import InvalidContainer
 from policy_store.policy import NewPolicy
@@ -89,7 +90,10 @@ def new_policy(
         architecture=metadata["architecture"],
         algorithm=metadata["algorithm"],
         checkpoint=checkpoint,
-        vectors={description_space(task): task_description(task).astype("float32")},
+        vectors={
+            description_space(task): task_description(task).astype("float32"),
+            SUMMARY_SPACE: task_summary(task).astype("float32"),
+        },
         seed=seed if isinstance(seed, int) else None,
         metrics=metrics if isinstance(metrics, dict) else {},
         metadata={key: value for key, value in metadata.items() if key not in _OWN_COLUMNS},

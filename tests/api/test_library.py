@@ -117,7 +117,8 @@ def test_nearest_source_task_is_first_and_is_transferred(client, policy):
     other = client.post("/library", json={"name": "far", "job_id": learned(client, moved(TASK, 0.3))}).json()
     near = moved(TASK, 0.01)
 
-    similar = client.post("/library/similar", json={"task": near, "k": 2}).json()["similar"]
+    asked = {"task": near, "similarity": "paper"}
+    similar = client.post("/library/similar", json={**asked, "k": 2}).json()["similar"]
     body = {**near, "algorithm": "transfer_qmix", "parameters": {"mode": "paper", "n_epochs": 3}}
     answer = client.post("/allocate", json=body).json()
 
@@ -127,9 +128,25 @@ def test_nearest_source_task_is_first_and_is_transferred(client, policy):
     assert answer["source_policy"]["name"] == "a town"
     assert answer["source_policy"]["distance"] == pytest.approx(similar[0]["distance"])
     assert answer["reward"] == pytest.approx(replay(near, answer["assignment"])["reward"])
-    only_one = client.post("/library/similar", json={"task": near, "k": 1}).json()["similar"]
+    only_one = client.post("/library/similar", json={**asked, "k": 1}).json()["similar"]
     assert only_one == similar[:1]
     client.delete(f"/library/{other['id']}")
+
+
+def test_similar_tasks_are_found_whatever_their_size(client, policy):
+    three = {**TASK, "uavs": [*TASK["uavs"], {**TASK["uavs"][0], "x_s": 0.15}]}
+
+    by_summary = client.post("/library/similar", json={"task": three, "k": 100}).json()["similar"]
+    by_numbers = client.post("/library/similar", json={"task": three, "similarity": "paper"}).json()[
+        "similar"
+    ]
+
+    distances = {item["policy"]["id"]: item["distance"] for item in by_summary}
+    assert 0 < distances[policy["id"]] < 0.2
+    assert list(distances.values()) == sorted(distances.values())
+    assert policy["id"] not in [item["policy"]["id"] for item in by_numbers]
+    wrong = client.post("/library/similar", json={"task": three, "similarity": "fast"})
+    assert wrong.status_code == 422
 
 
 def test_transfer_by_the_paper_needs_the_same_size(client, policy):

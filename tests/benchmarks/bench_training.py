@@ -46,7 +46,7 @@ def epoch_times(problem):
 
 def transfer_times(url, problem, repeats):
     """Seconds of whole transfers."""
-    solver = TransferQmix(TransferQmixParameters(), SolverContext(url))
+    solver = TransferQmix(TransferQmixParameters(mode="paper"), SolverContext(url))
     times = []
     for seed in range(repeats):
         start = time.perf_counter()

@@ -23,12 +23,33 @@ TABLE_3 = {**TABLE_1, "n_epochs": 200, "evaluate_per_epoch": 1}
     ("name", "table", "epsilon_start"), [("qmix", TABLE_1, 1.0), ("transfer_qmix", TABLE_3, 0.05)]
 )
 def test_defaults_are_the_papers_tables(name, table, epsilon_start):
-    parameters = parse_parameters(name, {}).model_dump()
+    parameters = parse_parameters(name, {"mode": "paper"})
+    assert parameters.mode == "paper"
+    if name == "transfer_qmix":
+        parameters = parameters.table_3()
+    parameters = parameters.model_dump()
     assert {key: parameters[key] for key in table} == table
     assert parameters["epsilon_start"] == epsilon_start
     assert (parameters["lr"], parameters["gamma"], parameters["grad_norm_clip"]) == (5e-4, 0.99, 10.0)
     assert (parameters["epsilon_end"], parameters["epsilon_anneal_steps"]) == (0.05, 50_000)
-    assert parameters["mode"] == "service"
+
+
+@pytest.mark.parametrize("name", ["qmix", "transfer_qmix"])
+def test_service_mode_is_the_default(name):
+    assert parse_parameters(name, {}).mode == "service"
+
+
+@pytest.mark.parametrize("given", [{"samples": 4}, {"polish": False}, {"polish_moves": 10}])
+def test_paper_mode_has_no_search(given):
+    assert TransferQmixParameters(**given).mode == "service"
+    with pytest.raises(ValidationError, match=f"{next(iter(given))} belongs to service mode"):
+        TransferQmixParameters(mode="paper", **given)
+
+
+def test_filled_in_parameters_are_parameters_again():
+    for mode in ("paper", "service"):
+        dumped = TransferQmixParameters(mode=mode).model_dump(mode="json")
+        assert TransferQmixParameters(**dumped).model_dump(mode="json") == dumped
 
 
 def test_first_update_waits_for_a_full_buffer_by_default():

@@ -90,7 +90,7 @@ def test_target_network_is_copied_every_so_many_epochs(problem, network):
 
 def test_target_network_period_counts_updates_too_in_transfer(problem, network):
     calls = []
-    parameters = TransferQmixParameters(n_epochs=9, learning_starts=4, update_target_params=5)
+    parameters = TransferQmixParameters(n_epochs=9, learning_starts=4, update_target_params=5).table_3()
     train(problem, network, parameters, calls=calls, count_updates=True)
     # Epoch 5 is the second update, the fifth update is epoch 8.
     assert [call for call in calls if call[0] == "target"] == [("target", 2), ("target", 5)]
@@ -98,7 +98,7 @@ def test_target_network_period_counts_updates_too_in_transfer(problem, network):
 
 def test_warm_start_explores_as_a_trained_policy_does(problem, network):
     """Trap: epsilon restarted at 1 destroys what was transferred."""
-    parameters = TransferQmixParameters()
+    parameters = TransferQmixParameters().table_3()
     assert parameters.epsilon_start == parameters.epsilon_end == 0.05
     epsilons = []
     environment = SwarmEnvironment(problem)
@@ -114,7 +114,7 @@ def test_warm_start_explores_as_a_trained_policy_does(problem, network):
         evaluator=Actor(SwarmEnvironment(problem), network),
         learner=Learner(network, 5e-4, 0.99, 10.0),
         buffer=ReplayBuffer(100, environment.sizes, problem.max_steps),
-        parameters=TransferQmixParameters(n_epochs=20),
+        parameters=TransferQmixParameters(n_epochs=20).table_3(),
         streams=random_streams(0),
         count_updates=True,
     )

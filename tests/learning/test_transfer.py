@@ -50,7 +50,7 @@ def store(tmp_path_factory):
 
 
 def transfer(store, problem, *, seed=1, stop=never, **parameters):
-    defaults = {"drqn_hidden_dim": 16, "qmix_hidden_dim": 8}
+    defaults = {"mode": "paper", "drqn_hidden_dim": 16, "qmix_hidden_dim": 8}
     solver = TransferQmix(TransferQmixParameters(**{**defaults, **parameters}), SolverContext(store[0]))
     return solver.solve(problem, seed, stop, lambda progress: None)
 
@@ -153,7 +153,7 @@ def test_no_source_of_the_hidden_units_is_refused(store):
 
 
 def test_no_library_is_refused():
-    solver = TransferQmix(TransferQmixParameters(), SolverContext())
+    solver = TransferQmix(TransferQmixParameters(mode="paper"), SolverContext())
     with pytest.raises(NoCompatibleSource, match="there is no library") as caught:
         solver.solve(task(0), 1, never, lambda progress: None)
     assert caught.value.details == {"sizes": []}

@@ -31,6 +31,7 @@ from app.api.registration import checkpoint_payload, job_payload, training_paylo
 from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey
 from app.api.services import Served
 from app.library.description import description_space, task_description
+from app.library.summary import SUMMARY_SPACE, task_summary
 
 router = APIRouter(prefix="/library", route_class=JsonRoute, tags=["library"])
 
@@ -131,10 +132,13 @@ def list_policies(
 def find_similar(
     body: Annotated[SimilarRequest, Body(openapi_examples=SIMILAR_EXAMPLES)], services: Served
 ) -> SimilarList:
-    """Compare a task with the source tasks of its size (lines 1 to 6 of Algorithm 2), nearest first."""
+    """Compare a task with the source tasks (lines 1 to 6 of Algorithm 2), nearest first."""
     task = to_problem(body.task, services.settings, "/task")
-    neighbours = services.library.nearest(description_space(task), task_description(task), body.k)
-    return similar_list(neighbours)
+    if body.similarity == "paper":
+        space, vector = description_space(task), task_description(task)
+    else:
+        space, vector = SUMMARY_SPACE, task_summary(task)
+    return similar_list(services.library.nearest(space, vector, body.k))
 
 
 @router.get(

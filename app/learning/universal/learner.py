@@ -168,27 +168,29 @@ class Learner:
 
     def _td_loss(self, batch: Batch, online: Values) -> Tensor:
         chosen = online.values.gather(1, batch.action[:, None])[:, 0]
-        joint, running = self._joint(batch, chosen, online.hidden, self.mixer)
+        joint, running = joint_values(batch, chosen, online.hidden, self.mixer)
         with torch.no_grad():
             best = online.values.masked_fill(~online.allowed, -torch.inf).argmax(dim=1, keepdim=True)
             slow = evaluate(self.target_agent, batch)
-            following, _ = self._joint(
+            following, _ = joint_values(
                 batch, slow.values.gather(1, best)[:, 0], slow.hidden, self.target_mixer
             )
             target = lambda_returns(batch.reward, following, running, self._gamma, self._td_lambda)
         error = (joint - target).square() * running
         return error.sum() / running.sum().clamp(min=1.0)
 
-    @staticmethod
-    def _joint(batch: Batch, chosen: Tensor, hidden: Tensor, mixer: UniversalMixer) -> tuple[Tensor, Tensor]:
-        """Q_tot (B, S) of chosen values (T,), and which steps (B, S) belong to their episodes."""
-        b, s, m = batch.sizes
-        place = (batch.episode, batch.step, batch.uav)
-        values = chosen.new_zeros(b, s, m).index_put(place, chosen)
-        present = torch.zeros(b, s, m, dtype=torch.bool, device=chosen.device)
-        present[place] = True
-        joint = mixer(values.view(b * s, m), hidden.reshape(b * s, m, -1), present.view(b * s, m))
-        return joint.view(b, s), present.any(dim=2).to(chosen.dtype)
+
+def joint_values(
+    batch: Batch, chosen: Tensor, hidden: Tensor, mixer: UniversalMixer
+) -> tuple[Tensor, Tensor]:
+    """Q_tot (B, S) of chosen values (T,), and which steps (B, S) belong to their episodes, 0 or 1."""
+    b, s, m = batch.sizes
+    place = (batch.episode, batch.step, batch.uav)
+    values = chosen.new_zeros(b, s, m).index_put(place, chosen)
+    present = torch.zeros(b, s, m, dtype=torch.bool, device=chosen.device)
+    present[place] = True
+    joint = mixer(values.view(b * s, m), hidden.reshape(b * s, m, -1), present.view(b * s, m))
+    return joint.view(b, s), present.any(dim=2).to(chosen.dtype)
 
 
 def lambda_returns(

@@ -12,10 +12,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from app.learning.universal.observation import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
-
-DISTANCE_FEATURES = 5
-HEADS = 4
+from app.learning.universal.architecture import (
+    DISTANCE_FEATURES,
+    HEADS,
+    OWN_FEATURES,
+    PAIR_FEATURES,
+    RIVAL_FEATURES,
+)
 
 
 class Layer(nn.Module):

@@ -15,17 +15,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from app.learning.universal.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import ALLOWED, Episodes, compiled, leg_home, leg_to, verdict
 
 Float32s = npt.NDArray[np.float32]
-
-VERSION = "universal-1"
-"""Version of the features; a network only understands the version it was trained with."""
-
-PAIR_FEATURES = 30
-OWN_FEATURES = 22
-RIVAL_FEATURES = 6
 
 FOLLOW_UPS = 16
 """Near targets considered for the visit after the next."""

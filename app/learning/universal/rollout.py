@@ -8,11 +8,10 @@ import numpy as np
 import torch
 from numba import njit
 
+from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.observation import (
-    OWN_FEATURES,
-    PAIR_FEATURES,
-    RIVAL_FEATURES,
+    FORBIDDEN,
     Float32s,
     Outlook,
     look,
@@ -22,6 +21,8 @@ from app.learning.universal.observation import (
 )
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
 
 
 class Played(NamedTuple):
@@ -46,8 +47,12 @@ def play(
     problem: Integers,
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
+    stop: StopCriterion = never,
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
+
+    The network is not asked where "return" is all that is allowed: whoever returns has no later turn, so what
+    it would remember of this one does not matter.
 
     Parameters
     ----------
@@ -59,6 +64,8 @@ def play(
         Samples actions with these random numbers; greedy where None.
     temperature
         Of the sampling; less is greedier.
+    stop
+        Asked before every turn; once it is true, everybody who is still out flies home.
     """
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
@@ -76,7 +83,10 @@ def play(
     single = len(bias) == 1
     for s in range(steps):
         for i in range(m):
-            count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn)
+            if stop():
+                _send_home(arrays, episodes, rewards)
+                return Played(plans, rewards)
+            count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn, rewards)
             if not count:
                 continue
             who = torch.from_numpy(turn[:count])
@@ -111,11 +121,19 @@ def _observe_turn(
     own: Float32s,
     rivals: Float32s,
     turn: Integers,
+    rewards: Floats,
 ) -> int:
-    """Observe for UAV `i` in every episode in which it is out; return how many those are."""
+    """Observe for UAV `i` in every episode in which it may visit a target; return how many those are.
+
+    Where it is out but may only return, it does.
+    """
     count = 0
     for b in range(episodes.done.shape[0]):
-        if not episodes.done[b] and not episodes.ret[b, i]:
+        if episodes.done[b] or episodes.ret[b, i]:
+            continue
+        if outlook.net[b, i].max() <= FORBIDDEN:
+            rewards[b] += act(arrays, episodes, b, i, outlook.net.shape[2])
+        else:
             observe(arrays, episodes, outlook, b, i, pair[count], own[count], rivals[count])
             turn[count] = b
             count += 1
@@ -145,3 +163,10 @@ def _end_steps(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> No
     for b in range(episodes.done.shape[0]):
         if not episodes.done[b]:
             rewards[b] += end_step(arrays, episodes, b)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _send_home(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> None:
+    for b in range(episodes.done.shape[0]):
+        for i in range(episodes.ret.shape[1]):
+            rewards[b] += act(arrays, episodes, b, i, arrays.level.shape[1])

@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.observation import (
-    OWN_FEATURES,
-    PAIR_FEATURES,
-    RIVAL_FEATURES,
     Float32s,
     Outlook,
     look,

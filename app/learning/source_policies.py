@@ -1,0 +1,183 @@
+"""Finding source policies in the library: the paper's way, and by what tasks have in common.
+
+Workers live long and answer many requests: a process keeps its library open and its last policies decoded.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from app.domain.errors import InvalidParameters, NoCompatibleSource, Violation
+from app.domain.problem import Problem
+from app.learning.architecture import QMIX_PAPER_1, QmixConfig
+from app.learning.checkpoint import Checkpoint, decode
+from app.learning.universal.architecture import QMIX_UNIVERSAL_1
+from app.library.description import description_space, task_description
+from app.library.summary import SUMMARY_SPACE, task_summary
+from app.solvers.protocol import SourcePolicy
+from policy_store.database import Database
+from policy_store.errors import PolicyNotFound
+from policy_store.library import PolicyLibrary
+from policy_store.policy import Policy
+from policy_store.similarity import squared_distances
+
+SHORTLIST = 4
+"""Policies for every size that are tried on a problem."""
+
+_LOOKED_THROUGH = 4 * SHORTLIST
+"""Nearest policies that the shortlist is made of: several may have the same weights."""
+
+_KEPT = 16
+"""Decoded checkpoints a process keeps; a policy for every size takes half a megabyte."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A policy of the library, and what it holds. The networks are shared: copy them before training."""
+
+    policy: SourcePolicy
+    checkpoint: Checkpoint
+
+
+class SourcePolicies:
+    """The policies of a library that could be transferred to a problem.
+
+    Parameters
+    ----------
+    library_url
+        The library's database, or None where there is none.
+    """
+
+    def __init__(self, library_url: str | None) -> None:
+        self._library = None if library_url is None else _open(library_url)
+
+    def most_similar(self, problem: Problem, config: QmixConfig) -> Source:
+        """Find the source of the paper (lines 1 to 6 of Algorithm 2), among networks of this shape.
+
+        Raises
+        ------
+        NoCompatibleSource
+            If there is none; ``details["sizes"]`` has the sizes there are.
+        """
+        library = self._library
+        if library is None:
+            raise _no_source(problem, "there is no library", [])
+        space, description = description_space(problem), task_description(problem)
+        asked, neighbours = 1, library.nearest(space, description, 1, QMIX_PAPER_1)
+        while True:
+            for neighbour in neighbours:
+                if neighbour.policy.metadata.get("config") == config.as_record():
+                    return self._source(neighbour.policy, neighbour.distance)
+            if len(neighbours) < asked:
+                break
+            # The nearest have other hidden units, which only requests that change the defaults meet.
+            asked *= 8
+            neighbours = library.nearest(space, description, asked, QMIX_PAPER_1)
+        sizes = library.sizes(QMIX_PAPER_1)
+        if neighbours:
+            reason = f"none has {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
+        else:
+            reason = "the library has " + (", ".join(f"{m}x{n}x{k}" for m, n, k in sizes) or "none at all")
+        raise _no_source(problem, reason, sizes)
+
+    def shortlist(self, problem: Problem) -> list[Source]:
+        """Return the policies for every size with the nearest source tasks, nearest first, weights once each.
+
+        Raises
+        ------
+        NoCompatibleSource
+            If there is none; ``details["sizes"]`` has the sizes of the other policies.
+        """
+        library = self._library
+        if library is None:
+            raise _no_source(problem, "there is no library", [])
+        near = library.nearest(SUMMARY_SPACE, task_summary(problem), _LOOKED_THROUGH, QMIX_UNIVERSAL_1)
+        if not near:
+            reason = f"the library has no policy of architecture {QMIX_UNIVERSAL_1}, which fits every size"
+            raise _no_source(problem, reason, library.sizes())
+        # Among equals the nearest stays: of the same key a dictionary keeps the last.
+        once = {neighbour.policy.checkpoint_sha256: neighbour for neighbour in reversed(near)}
+        nearest = sorted(once.values(), key=near.index)[:SHORTLIST]
+        return [self._source(neighbour.policy, neighbour.distance) for neighbour in nearest]
+
+    def asked_for(self, policy_id: str, problem: Problem, *, config: QmixConfig, any_size: bool) -> Source:
+        """Return the policy that a request names.
+
+        Parameters
+        ----------
+        policy_id
+            Its id.
+        problem
+            The problem it shall be transferred to.
+        config
+            Shape of the networks of a policy for one size.
+        any_size
+            Whether a policy for every size may be asked for too.
+
+        Raises
+        ------
+        InvalidParameters
+            If there is no such policy, or it does not fit.
+        """
+        try:
+            if self._library is None:
+                raise PolicyNotFound(policy_id)
+            policy, vectors = self._library.get(policy_id), self._library.vectors(policy_id)
+        except PolicyNotFound:
+            raise _bad_source(f"there is no policy {policy_id!r} in the library") from None
+        if any_size and policy.architecture == QMIX_UNIVERSAL_1:
+            return self._source(policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
+        space = description_space(problem)
+        fits = policy.architecture == QMIX_PAPER_1 and policy.metadata.get("config") == config.as_record()
+        if not fits or space not in vectors:
+            raise _bad_source(
+                f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "
+                f"{_size(problem)} with {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
+            )
+        if any_size:
+            return self._source(policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
+        return self._source(policy, _distance(vectors[space], task_description(problem)))
+
+    def _source(self, policy: Policy, distance: float) -> Source:
+        checkpoint = _decoded.get(policy.checkpoint_sha256)
+        if checkpoint is None:
+            assert self._library is not None
+            checkpoint = decode(self._library.checkpoint(policy.id))
+            _decoded[policy.checkpoint_sha256] = checkpoint
+            if len(_decoded) > _KEPT:
+                _decoded.popitem(last=False)
+        _decoded.move_to_end(policy.checkpoint_sha256)
+        return Source(SourcePolicy(policy.id, policy.name, distance), checkpoint)
+
+
+_decoded: OrderedDict[str, Checkpoint] = OrderedDict()
+
+
+@lru_cache(maxsize=4)
+def _open(library_url: str) -> PolicyLibrary:
+    return PolicyLibrary(Database(library_url))
+
+
+def _distance(vector: np.ndarray, query: np.ndarray) -> float:
+    return float(squared_distances(vector[None], query.astype(np.float32))[0])
+
+
+def _size(item: Any) -> str:
+    return f"{item.n_uavs}x{item.n_targets}x{item.n_materials}"
+
+
+def _no_source(problem: Problem, reason: str, sizes: Sequence[tuple[int, int, int]]) -> NoCompatibleSource:
+    return NoCompatibleSource(
+        f"no source policy for {_size(problem)} (UAVs x targets x materials): {reason}",
+        details={"sizes": [list(size) for size in sizes]},
+    )
+
+
+def _bad_source(detail: str) -> InvalidParameters:
+    return InvalidParameters(detail, [Violation("/parameters/source", detail)])

@@ -1,0 +1,61 @@
+"""How much a request is given where it does not say: by the size of its problem, never by the clock.
+
+A size is weighed by what the policy costs on it: a turn compares N targets with each other and each with M
+rivals, and there are M turns in each of S steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.simulation.arrays import ProblemArrays
+
+_MOST_WORK = 6e7
+"""Work of a greedy roll-out that is done without being asked for; some seconds."""
+
+_SAMPLING_WORK = 1.6e7
+"""Work of all sampled roll-outs together; about a second."""
+
+_SAMPLES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What a request is given.
+
+    Attributes
+    ----------
+    policy
+        Whether a policy is rolled out at all.
+    samples, n_epochs, polish_moves
+        By the names of the parameters.
+    """
+
+    policy: bool
+    samples: int
+    n_epochs: int
+    polish_moves: int
+
+
+def effort(arrays: ProblemArrays) -> Effort:
+    """Return what a problem is given by default."""
+    work = roll_out_work(arrays)
+    return Effort(
+        policy=work <= _MOST_WORK,
+        samples=int(min(_SAMPLES, _SAMPLING_WORK / work)),
+        n_epochs=0,
+        polish_moves=1_000_000,
+    )
+
+
+def roll_out_work(arrays: ProblemArrays) -> float:
+    """Weigh a greedy roll-out: 20 million take about a second."""
+    m, n, _ = arrays.shape
+    return float(m * int(arrays.max_steps[0]) * n * (m + 0.25 * n + 50))
+
+
+def batch_of(arrays: ProblemArrays, most: int) -> int:
+    """Return how many episodes may be played at once within 64 MiB, at least 1 and at most `most`."""
+    m, n, _ = arrays.shape
+    episode = 400 * n * m + 64 * (n + 1) ** 2 + 4000 * n
+    return max(1, min(most, 2**26 // episode))

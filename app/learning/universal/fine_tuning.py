@@ -1,0 +1,96 @@
+"""Fine-tuning a policy on one problem: its own episodes, and the best plan known as a demonstration."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import torch
+
+from app.domain.errors import ProblemTooLarge
+from app.learning.universal.effort import batch_of
+from app.learning.universal.learner import Learner, make_batch
+from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.rollout import play
+from app.learning.universal.unfolding import unfold
+from app.simulation.arrays import Integers, ProblemArrays, stack
+from app.solvers.protocol import StopCriterion
+
+_TURN_TOKENS = 8000
+"""Tokens of own episodes an epoch learns from at most: turns times targets."""
+
+MAX_BYTES = 2**30
+"""Most memory that an update may take; workers share a machine."""
+
+
+class FineTuning:
+    """Fits a copy of a policy to a problem, epoch by epoch.
+
+    Parameters
+    ----------
+    policy
+        Where it begins; not changed.
+    arrays
+        A stack of one problem.
+    batch_size
+        Episodes an epoch at most; fewer where they are long.
+    lr, gamma
+        Learning rate of Adam, discount.
+    rng
+        Source of the episodes.
+
+    Raises
+    ------
+    ProblemTooLarge
+        If an update on one episode would not fit into memory.
+    """
+
+    def __init__(
+        self,
+        policy: UniversalPolicy,
+        arrays: ProblemArrays,
+        *,
+        batch_size: int,
+        lr: float,
+        gamma: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self.policy = copy.deepcopy(policy)
+        self._arrays, self._rng = arrays, rng
+        m, n, _ = arrays.shape
+        turns = m * int(arrays.max_steps[0])
+        # Biases and weights of attention a pair of tokens, activations a token and a rival.
+        needed = turns * (300 * (n + 1) ** 2 + 10_000 * n + 700 * n * m)
+        if needed > MAX_BYTES:
+            raise ProblemTooLarge(
+                f"fine-tuning on {m} UAVs and {n} targets over {int(arrays.max_steps[0])} steps takes "
+                f"{needed / 2**20:.0f} MiB; the limit is {MAX_BYTES / 2**20:.0f} MiB"
+            )
+        tokens = turns * (n + 1)
+        self._episodes = batch_of(arrays, max(1, min(batch_size, _TURN_TOKENS // tokens)))
+        self._learner = Learner(self.policy.agent, self.policy.mixer, lr=lr, td_weight=0.2, gamma=gamma)
+
+    def epoch(self, best: Integers, stop: StopCriterion) -> Integers:
+        """Play some episodes and learn from them and from the best plan; return the plans (B, S, M).
+
+        Parameters
+        ----------
+        best
+            (S, M) the best plan there is; it flies somewhere.
+        stop
+            Once it is true nothing more is learned.
+        """
+        problem = np.zeros(self._episodes, np.int64)
+        plans = play(self.policy.agent, self._arrays, problem, self._rng, stop=stop).plans
+        if not stop():
+            self._learn(plans, imitate=False)
+        if not stop():
+            self._learn(best[None], imitate=True)
+        return plans
+
+    def _learn(self, plans: Integers, *, imitate: bool) -> None:
+        problem = np.zeros(len(plans), np.int64)
+        turns = unfold(self._arrays, problem, plans)
+        stacked = stack([self._arrays] * len(plans))
+        batch = make_batch(stacked, turns, torch.device("cpu"))
+        self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate)

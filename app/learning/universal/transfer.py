@@ -1,0 +1,182 @@
+"""Transfer-QMIX in service mode: a policy for every size, rolled out, sampled, fine-tuned and polished.
+
+Each part only ever adds plans; the best by its true reward is kept. The features of the policy do not change
+when a map is rotated or mirrored, so trying a problem in its eight positions would give eight times the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from app.domain.problem import Problem
+from app.learning.checkpoint import encode
+from app.learning.parameters import TransferQmixParameters
+from app.learning.source_policies import Source
+from app.learning.universal.best_plan import BestPlan
+from app.learning.universal.effort import Effort, batch_of, effort
+from app.learning.universal.fine_tuning import FineTuning
+from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.polishing import polish
+from app.learning.universal.rollout import play
+from app.simulation.arrays import compile_problem
+from app.simulation.simulator import new_episodes
+from app.solvers.greedy import greedy_plan
+from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
+
+FINE_TUNING_LR = 1e-4
+"""Learning rate of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
+
+_SHARES = {"roll-out": 0.05, "samples": 0.35, "fine-tuning": 0.55, "polish": 1.0}
+"""Share of the work that is done at the end of each part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Used:
+    """The parameters with all defaults filled in."""
+
+    parameters: TransferQmixParameters
+    samples: int
+    n_epochs: int
+    polish_moves: int
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether the policy's greedy roll-out is all that is asked for."""
+        return not (self.samples or self.n_epochs or self.polish_moves)
+
+
+class UniversalTransfer:
+    """Solves one problem.
+
+    Parameters
+    ----------
+    problem, seed, stop, report
+        As :class:`~app.solvers.protocol.Solver` has them.
+    parameters
+        Of service mode.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        parameters: TransferQmixParameters,
+        seed: int,
+        stop: StopCriterion,
+        report: Report,
+    ) -> None:
+        self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
+        self._arrays = compile_problem(problem)
+        self._effort = effort(self._arrays)
+        self._used = fill_in(parameters, self._effort)
+        self._best = BestPlan(self._arrays)
+        self._history = History()
+        root = np.random.SeedSequence([abs(seed), int(seed < 0)])
+        self._sampling, self._tuning, self._polishing = map(np.random.default_rng, root.spawn(3))
+
+    def run(self, sources: Sequence[Source]) -> Solution:
+        """Solve it from the best of some policies for every size, nearest first."""
+        used, checkpoint = self._used, None
+        if new_episodes(self._arrays, 1).done[0]:
+            # Nobody can fly anywhere: every policy would stay at home.
+            self._history.add(0, self._best.reward)
+            return Solution(self._best.plan, self._history, used.parameters, sources[0].policy)
+        if not used.is_bare:
+            self._best.consider(greedy_plan(self._problem).as_array()[None])
+        source = None
+        if self._effort.policy or used.is_bare or used.parameters.source is not None:
+            source, reward = self._roll_out(sources)
+            self._history.add(0, reward)
+            self._tell("roll-out", 1.0)
+            policy = cast(UniversalPolicy, source.checkpoint.network)
+            self._sample(policy)
+            checkpoint = self._fine_tune(policy)
+        else:
+            self._history.add(0, self._best.reward)
+        polish(
+            self._arrays,
+            self._best,
+            used.polish_moves,
+            self._polishing,
+            self._stop,
+            lambda share: self._tell("polish", share),
+        )
+        found = None if source is None else source.policy
+        return Solution(self._best.plan, self._history, used.parameters, found, checkpoint)
+
+    def _roll_out(self, sources: Sequence[Source]) -> tuple[Source, float]:
+        """Play each policy greedily; return the best, among equals the nearest, and what it earned."""
+        found: list[tuple[Source, float]] = []
+        for source in sources:
+            policy = cast(UniversalPolicy, source.checkpoint.network)
+            played = play(policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
+            self._best.consider(played.plans)
+            found.append((source, float(played.rewards[0])))
+            if self._stop():
+                break
+        return max(found, key=lambda each: each[1])
+
+    def _sample(self, policy: UniversalPolicy) -> None:
+        done, samples = 0, self._used.samples
+        while done < samples and not self._stop():
+            problem = np.zeros(batch_of(self._arrays, samples - done), np.int64)
+            played = play(policy.agent, self._arrays, problem, self._sampling, stop=self._stop)
+            self._best.consider(played.plans)
+            done += len(problem)
+            self._tell("samples", done / samples)
+
+    def _fine_tune(self, policy: UniversalPolicy) -> bytes | None:
+        """Fine-tune a copy; its checkpoint, or None where no epoch was done."""
+        used, best = self._used, self._best
+        if not used.n_epochs or self._stop():
+            return None
+        parameters = used.parameters
+        tuning = FineTuning(
+            policy,
+            self._arrays,
+            batch_size=parameters.batch_size,
+            lr=FINE_TUNING_LR,
+            gamma=parameters.gamma,
+            rng=self._tuning,
+        )
+        done = 0
+        while done < used.n_epochs and not self._stop():
+            best.consider(tuning.epoch(best.actions, self._stop))
+            done += 1
+            if done % parameters.evaluate_per_epoch == 0 or done == used.n_epochs:
+                played = play(tuning.policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
+                best.consider(played.plans)
+                if not self._stop():
+                    self._history.add(done, float(played.rewards[0]))
+            self._tell("fine-tuning", done / used.n_epochs, done)
+        return encode(
+            tuning.policy,
+            config=policy.config,
+            task=self._problem,
+            algorithm="transfer_qmix",
+            seed=self._seed,
+            parameters=parameters,
+            metrics={"reward": best.reward, "greedy_reward": self._history.reward[-1], "epochs": done},
+        )
+
+    def _tell(self, part: str, share: float, epoch: int | None = None) -> None:
+        begin = max((done for done in _SHARES.values() if done < _SHARES[part]), default=0.0)
+        fraction = begin + share * (_SHARES[part] - begin)
+        epoch = self._history.epoch[-1] if epoch is None else epoch
+        self._report(Progress(fraction, epoch, self._best.reward, self._best.plan))
+
+
+def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
+    """Fill in what a request leaves open."""
+    samples = default.samples if parameters.samples is None else parameters.samples
+    n_epochs = default.n_epochs if parameters.n_epochs is None else parameters.n_epochs
+    polished = parameters.polish is not False
+    moves = default.polish_moves if parameters.polish_moves is None else parameters.polish_moves
+    moves = moves if polished else 0
+    filled = parameters.model_copy(
+        update={"samples": samples, "n_epochs": n_epochs, "polish": polished, "polish_moves": moves}
+    )
+    return Used(filled, samples, n_epochs, moves)
