@@ -20,6 +20,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from app.api.access.keys import KeyStore, Role
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.application import create_application
+from app.api.logs import configure_logs
 from app.api.problem_models import to_problem
 from app.api.receipt_deadline import protocol_with_deadline
 from app.domain.errors import AllocatorError
@@ -71,10 +72,13 @@ def serve(
                 err=True,
             )
             raise typer.Exit(2)
+    configure_logs(settings.log_level)
     uvicorn.run(
         create_application(settings),
         host=settings.host,
         port=settings.port,
+        log_config=None,
+        access_log=False,
         http=protocol_with_deadline(settings.receive_timeout_s),
         timeout_graceful_shutdown=int(settings.shutdown_grace_s),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
@@ -35,6 +35,9 @@ class Settings(BaseSettings):
         default=(), description="Origins whose pages may call the service, with commas between them"
     )
 
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="info", description="What is logged at least: `debug`, `info`, `warning` or `error`"
+    )
     workers: int = Field(
         default_factory=lambda: os.cpu_count() or 1,
         ge=1,

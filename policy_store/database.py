@@ -113,6 +113,13 @@ class Database:
         with self.read_engine.connect() as connection:
             yield connection
 
+    def size(self) -> int:
+        """Return how many bytes the database has, without what is not yet moved from its log."""
+        with self.read() as connection:
+            pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
+            page_bytes = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
+        return int(pages * page_bytes)
+
     def migrate(self, script_location: Path, version_table: str) -> None:
         """Bring tables to the newest version of an Alembic folder, all of it or nothing.
 

@@ -1,11 +1,26 @@
-"""The command line: keys are made, listed and revoked, and nothing is served to strangers by accident."""
+"""The command line: keys, what is served to whom, and what is logged of it."""
 
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import httpx
 import pytest
 from typer.testing import CliRunner
 
 from app.api.access.keys import KeyStore, Role, recognise
 from app.cli import application
 from policy_store.database import Database
+
+ROOT = Path(__file__).parents[1]
+START_S = 120.0
 
 
 @pytest.fixture
@@ -64,3 +79,77 @@ def test_others_are_not_served_without_a_usable_key(invoke, revoked):
     assert refused.exit_code == 2
     assert "0.0.0.0" in refused.stderr
     assert "--no-keys" in refused.stderr
+
+
+@pytest.fixture
+def serve(tmp_path):
+    """Starts ``python -m app serve`` on a free port, its log in a file, and waits until it answers."""
+    running = []
+
+    def start(**environment):
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            port = probe.getsockname()[1]
+        log = tmp_path / f"log-{port}"
+        command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(tmp_path)]
+        with log.open("wb") as stderr:
+            process = subprocess.Popen(
+                command, stderr=stderr, cwd=ROOT, env=os.environ | {"ALLOCATOR_WORKERS": "1"} | environment
+            )
+        client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=START_S)
+        running.append((process, client))
+        deadline = time.monotonic() + START_S
+        while True:
+            with contextlib.suppress(httpx.TransportError):
+                client.get("/healthz")
+                return client, process, log
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < deadline
+            threading.Event().wait(0.05)
+
+    yield start
+    for process, client in running:
+        client.close()
+        process.kill()
+        process.wait()
+
+
+def test_the_log_tells_of_requests_and_jobs_and_never_of_keys(invoke, serve):
+    tokens = [
+        invoke("keys", "create", "--role", role, "--name", "x").stdout.strip()
+        for role in ("allocate", "library")
+    ]
+    client, process, log = serve(ALLOCATOR_LOG_LEVEL="debug")
+    sent = {"Authorization": f"Bearer {tokens[0]}"}
+    problem = json.loads((ROOT / "app/examples/paper-5x10.json").read_text("utf-8"))
+
+    def ask(method, path, **options):
+        return client.request(method, path, **options).headers["x-request-id"]
+
+    asked = client.post("/allocate", json={**problem, "algorithm": "greedy"}, headers=sent)
+    assert asked.status_code == 200, asked.text
+    ids = [
+        asked.headers["x-request-id"],
+        ask("GET", "/jobs", headers=sent),
+        ask("DELETE", "/library/x", headers=sent),
+        ask("GET", "/jobs", headers={"Authorization": f"Basic {tokens[1]}"}),
+        ask("GET", "/jobs", params={"key": tokens[1], "cursor": tokens[0]}, headers=sent),
+        ask("POST", "/allocate", json={"key": tokens[1]}, headers=sent),
+        ask("GET", "/a%0Ab%1B[31m"),
+    ]
+    process.send_signal(signal.SIGTERM)
+    process.wait(START_S)
+
+    text = log.read_text("utf-8")
+    for token in tokens:
+        assert token.partition(".")[2] not in text
+    lines = [json.loads(line) for line in text.splitlines()]
+    for line in lines:
+        assert {"time", "level", "logger", "event"} <= line.keys()
+    requests = {line["request_id"]: line for line in lines if line["event"] == "request"}
+    assert [requests[given]["status"] for given in ids] == [200, 200, 403, 401, 422, 422, 401]
+    assert requests[ids[-1]]["path"] == "/a\nb\x1b[31m"
+    assert requests[ids[0]]["duration_ms"] > 0
+    job_id = asked.json()["job_id"]
+    told = [line["event"] for line in lines if line.get("job_id") == job_id]
+    assert told == ["job taken in", "job ended"]
+    assert ids[0] in {line.get("request_id") for line in lines if line.get("job_id") == job_id}

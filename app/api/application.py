@@ -18,6 +18,8 @@ from app.api.documentation import DESCRIPTION, TAGS, install_documentation, oper
 from app.api.error_handlers import install_error_handlers
 from app.api.job_kinds import job_kinds
 from app.api.json_body import BodyLimit
+from app.api.metrics import Metrics
+from app.api.request_log import RequestLog
 from app.api.routes import algorithms, allocation, examples, jobs, library, operations
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
@@ -52,6 +54,8 @@ def create_application(settings: Settings) -> FastAPI:
         Everything an operator can set; nothing else is read from the environment.
     """
 
+    metrics = Metrics()
+
     @asynccontextmanager
     async def lifespan(application: FastAPI) -> AsyncIterator[None]:
         limits = ContainerLimits(bytes=settings.max_checkpoint_bytes)
@@ -70,9 +74,11 @@ def create_application(settings: Settings) -> FastAPI:
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
+                observer=metrics,
             )
+            metrics.watch(service.load, store.count, database.size)
             await service.start()
-            application.state.services = Services(settings, database, store, service, keys)
+            application.state.services = Services(settings, database, store, service, keys, metrics)
             try:
                 yield
             finally:
@@ -89,7 +95,7 @@ def create_application(settings: Settings) -> FastAPI:
         redoc_url=None,
         lifespan=lifespan,
         generate_unique_id_function=operation_id,
-        middleware=_middleware(settings),
+        middleware=_middleware(settings, metrics),
     )
     for room in (allocation, algorithms, jobs, library, examples, operations):
         application.include_router(room.router)
@@ -98,10 +104,11 @@ def create_application(settings: Settings) -> FastAPI:
     return application
 
 
-def _middleware(settings: Settings) -> list[Middleware]:
+def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:
     """List the middleware, outermost first: what adds to every response stands before what refuses."""
     listed = [
         Middleware(CorrelationIdMiddleware, validator=lambda given: _REQUEST_ID.fullmatch(given) is not None),
+        Middleware(RequestLog, metrics=metrics),
         Middleware(SecurityHeaders),
     ]
     if settings.cors_origins:

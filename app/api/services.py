@@ -8,6 +8,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 
 from app.api.access.keys import KeyStore
+from app.api.metrics import Metrics
 from app.jobs.service import JobService
 from app.settings import Settings
 from policy_store.database import Database
@@ -23,6 +24,7 @@ class Services:
     library: PolicyLibrary
     jobs: JobService
     keys: KeyStore
+    metrics: Metrics
 
 
 def _services(request: Request) -> Services:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from sqlalchemy.exc import OperationalError
+from structlog.contextvars import bind_contextvars
 
 from app.jobs.channel import Channels, rung
 from app.jobs.errors import Draining, UnknownJobKind
@@ -22,6 +23,7 @@ from app.jobs.executor import Execution, Executor, Outcome, Raised, Returned
 from app.jobs.failure import INTERNAL_ERROR, describe, failure
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
+from app.jobs.observer import JobObserver
 from app.jobs.owner import is_alive
 from app.jobs.store import Claim, JobStore, QueueLimit
 
@@ -63,7 +65,7 @@ class Dispatcher:
         The job table.
     owner
         In whose name the store takes jobs.
-    kinds, executor, max_queued, overrun_grace_s
+    kinds, executor, max_queued, overrun_grace_s, observer
         As given to :class:`app.jobs.service.JobService`.
     channels
         Who listens to which job.
@@ -79,6 +81,7 @@ class Dispatcher:
         *,
         max_queued: int,
         overrun_grace_s: float,
+        observer: JobObserver,
     ) -> None:
         self._store = store
         self._owner = owner
@@ -87,6 +90,7 @@ class Dispatcher:
         self._channels = channels
         self._max_queued = max_queued
         self._grace_s = overrun_grace_s
+        self._observer = observer
         self._writer = ThreadPoolExecutor(1, thread_name_prefix="jobs-write")
         self._lanes = Lanes(executor.capacity)
         self._runs: dict[str, _Run] = {}
@@ -173,6 +177,8 @@ class Dispatcher:
             if run_now:
                 self._give_back(lane)
             raise
+        if created:
+            _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
         if created and run_now:
             self._begin(claim)
         elif created:
@@ -192,7 +198,7 @@ class Dispatcher:
         job, before = await self._write(self._store.cancel, job_id)
         if before is JobStatus.QUEUED:
             self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
-            self._channels.end(job)
+            self._tell_end(job, None)
         run = self._runs.get(job_id)
         if before is JobStatus.RUNNING and run is not None and run.execution is not None:
             run.execution.cancel()
@@ -206,6 +212,7 @@ class Dispatcher:
             ready=self._executor.ready,
             running=dict(self._lanes.running),
             waiting=dict(self._lanes.waiting),
+            restarts=self._executor.restarts,
         )
 
     def runs(self, job_id: str) -> bool:
@@ -253,6 +260,8 @@ class Dispatcher:
             run.progress, run.unsaved = progress, True
             channel.report(progress)
 
+        if job.attempt == 1 and job.started_at is not None:
+            self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
         left = None if claim.deadline is None else claim.deadline - time.time()
         run.execution = self._executor.submit(
             self._kinds[job.kind].work, job.payload, time_left_s=left, on_progress=on_progress
@@ -264,7 +273,8 @@ class Dispatcher:
 
     async def _finish(self, run: _Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
-        begun = time.monotonic()
+        bind_contextvars(job_id=run.job.id)
+        begun, took = time.monotonic(), None
         job: Job | None = None
         try:
             outcome = await execution.outcome()
@@ -273,15 +283,15 @@ class Dispatcher:
                 timer.cancel()
             job = await self._settle(run, outcome)
         except Exception:
-            _log.exception("job %s: its end could not be stored; the next start runs it again", run.job.id)
+            _log.exception("a job's end could not be stored; the next start runs it again")
         else:
             if job is None:
-                _log.warning("job %s went on without attempt %d", run.job.id, run.job.attempt)
+                _log.warning("a job went on without attempt %d", run.job.attempt)
             elif job.status is JobStatus.SUCCEEDED:
                 self._lanes.ran(job.lane, [took])
         del self._runs[run.job.id]
         if job is not None and job.status.finished:
-            self._channels.end(job)
+            self._tell_end(job, took)
         elif job is not None:
             self._lanes.waiting[job.lane] += 1
         self._give_back(run.job.lane)
@@ -300,11 +310,15 @@ class Dispatcher:
                     self._kinds[job.kind].on_success,
                 )
             except Exception as exception:
-                _log.exception("job %s: its result could not be stored", job.id)
+                _log.exception("a job's result could not be stored")
                 outcome = Raised(describe(exception), "")
         if isinstance(outcome, Raised):
             if outcome.error["code"] == INTERNAL_ERROR:
-                _log.error("job %s failed: %s\n%s", job.id, outcome.error["detail"], outcome.traceback)
+                _log.error(
+                    "a job failed: %s",
+                    outcome.error["detail"],
+                    extra={"worker_traceback": outcome.traceback},
+                )
             return await self._write_surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
         if run.killed_for == "stop":
             return await self._write_surely(self._store.release, job.id, job.attempt, progress)
@@ -314,8 +328,23 @@ class Dispatcher:
                 f"the work did not stop within {self._grace_s:g} s after its time limit, and was ended",
             )
             return await self._write_surely(self._store.fail, job.id, job.attempt, error, progress)
-        _log.warning("job %s, attempt %d: %s", job.id, job.attempt, outcome.reason)
+        _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)
         return await self._write_surely(self._store.lose, job.id, job.attempt, outcome.reason, progress)
+
+    def _tell_end(self, job: Job, ran_s: float | None) -> None:
+        """Tell everybody who is interested that a job has ended."""
+        self._channels.end(job)
+        self._observer.ended(job, ran_s)
+        _log.info(
+            "job ended",
+            extra={
+                "job_id": job.id,
+                "kind": job.kind,
+                "status": job.status.value,
+                "reason": None if job.error is None else job.error["code"],
+                "ran_s": None if ran_s is None else round(ran_s, 4),
+            },
+        )
 
     def _give_back(self, lane: Lane) -> None:
         self._lanes.running[lane] -= 1
@@ -351,9 +380,12 @@ class Dispatcher:
             self._store.recover, tuple(self._kinds), lambda owner: is_alive(owner, self._owner)
         )
         for job in changed:
-            _log.warning("job %s was left behind by an earlier process: %s", job.id, job.status)
+            _log.warning(
+                "a job was left behind by an earlier process",
+                extra={"job_id": job.id, "status": job.status.value},
+            )
             if job.status.finished:
-                self._channels.end(job)
+                self._tell_end(job, None)
         waiting = await self._write(self._store.waiting)
         self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
 

@@ -61,6 +61,10 @@ class Executor(Protocol):
     def ready(self) -> int:
         """How many workers are warm now, whether they work or not."""
 
+    @property
+    def restarts(self) -> int:
+        """How many workers have been replaced."""
+
     async def start(self, on_ready: Callable[[], None]) -> None:
         """Begin to start the workers, without waiting for them; ``on_ready`` is called for each."""
 

@@ -69,6 +69,7 @@ class LocalExecutor:
         self._free: asyncio.Queue[_Worker] = asyncio.Queue()
         self._executions: set[_LocalExecution] = set()
         self._closing = asyncio.Event()
+        self._restarts = 0
         self._keepers: list[asyncio.Task[None]] = []
 
     @property
@@ -80,6 +81,11 @@ class LocalExecutor:
     def ready(self) -> int:
         """How many workers are warm, whether they work or not."""
         return len(self._ready)
+
+    @property
+    def restarts(self) -> int:
+        """How many workers have been replaced."""
+        return self._restarts
 
     async def start(self, on_ready: Callable[[], None]) -> None:
         """Begin to start the workers; ``on_ready`` is called for each, and for each that replaces one."""
@@ -117,6 +123,8 @@ class LocalExecutor:
             else:
                 await rung(self._closing, pause)
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
+            if not self._closing.is_set():
+                self._restarts += 1
 
     async def _live_once(self, on_ready: Callable[[], None]) -> bool:
         """Start one worker and stay until it is gone; False if it never became warm."""
@@ -129,6 +137,8 @@ class LocalExecutor:
                 self._free.put_nowait(slot)
                 on_ready()
                 await slot.gone.wait()
+                if not self._closing.is_set():
+                    _log.warning("a worker is gone and is replaced", extra={"worker_pid": slot.pid})
         except Exception:
             if not self._closing.is_set():
                 _log.exception("a worker could not be started; there will be another try")

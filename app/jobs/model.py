@@ -128,12 +128,15 @@ class Load:
         Workers that are warm now; the service answers quickly once there is one.
     running, waiting
         Jobs by lane.
+    restarts
+        Workers that were replaced since the start because they died or were killed.
     """
 
     capacity: int
     ready: int
     running: dict[Lane, int]
     waiting: dict[Lane, int]
+    restarts: int
 
 
 @dataclass(frozen=True, slots=True)

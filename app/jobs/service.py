@@ -12,6 +12,7 @@ from app.jobs.channel import Channels, replay, rung
 from app.jobs.dispatcher import Dispatcher
 from app.jobs.executor import Executor
 from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, Load
+from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
 from app.jobs.store import Database, JobStore
 
@@ -40,6 +41,8 @@ class JobService:
         How often a job may be lost with its worker or its process before it has failed.
     overrun_grace_s
         How long work may go on after it was cancelled or its time is up, before its worker is killed.
+    observer
+        Told of jobs as they begin and end.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class JobService:
         max_queued: int = 64,
         max_attempts: int = 3,
         overrun_grace_s: float = 5.0,
+        observer: JobObserver | None = None,
     ) -> None:
         owner = new_owner()
         self._store = JobStore(database, owner, max_attempts)
@@ -63,6 +67,7 @@ class JobService:
             self._channels,
             max_queued=max_queued,
             overrun_grace_s=overrun_grace_s,
+            observer=observer or NoObserver(),
         )
         self._stopping = False
         self._stopped = False

@@ -1,10 +1,12 @@
-"""Is the service alive, and is it ready."""
+"""Is the service alive, is it ready, and what does it do."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter
+from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 from pydantic import Field
 from sqlalchemy.exc import SQLAlchemyError
+from starlette.responses import Response
 
 import app
 from app.api.allocation_models import AnswerModel
@@ -57,3 +59,20 @@ def get_readiness(services: Served) -> Readiness:
         jobs_waiting=sum(load.waiting.values()),
         policies=policies,
     )
+
+
+@router.get(
+    "/metrics",
+    summary="Metrics",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "Prometheus' text format",
+            "content": {"text/plain": {"schema": {"type": "string"}}},
+        },
+        **responses(),
+    },
+)
+def get_metrics(services: Served) -> Response:
+    """Return counts, durations and levels for Prometheus."""
+    return Response(services.metrics.render(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -1,0 +1,96 @@
+"""Metrics: requests and jobs are counted where they belong, and nothing a client makes up becomes a label."""
+
+import os
+import signal
+
+from prometheus_client.parser import text_string_to_metric_families
+
+
+def samples(client):
+    """The samples by name and labels."""
+    text = client.get("/metrics").text
+    return {
+        (sample.name, *sorted(sample.labels.items())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+
+
+def grown(before, after, name, **labels):
+    key = (name, *sorted(labels.items()))
+    return after[key] - before.get(key, 0)
+
+
+def test_requests_are_counted_by_route_and_status(client):
+    before = samples(client)
+    client.get("/jobs/" + "0" * 32)
+    client.get("/jobs/" + "1" * 32)
+    client.get("/algorithms")
+    client.request("BREW", "/coffee")
+    client.get("/nothing-at-all")
+    after = samples(client)
+
+    requests = "allocator_http_requests_total"
+    assert grown(before, after, requests, method="GET", route="/jobs/{job_id}", status="404") == 2
+    assert grown(before, after, requests, method="GET", route="/algorithms", status="200") == 1
+    assert grown(before, after, requests, method="GET", route="unmatched", status="404") == 1
+    assert grown(before, after, requests, method="other", route="unmatched", status="404") == 1
+    assert (
+        grown(before, after, "allocator_http_response_seconds_count", method="GET", route="/algorithms") == 1
+    )
+    labels = {value for key in after for _, value in key[1:]}
+    assert not any("coffee" in value or "nothing" in value or "0000" in value for value in labels)
+
+
+def test_jobs_are_counted_by_end_wait_and_algorithm(client, problem):
+    before = samples(client)
+    client.post("/allocate", json={**problem, "algorithm": "greedy"}).raise_for_status()
+    refused = client.post("/allocate", json={**problem, "algorithm": "dqn"})
+    after = samples(client)
+
+    assert refused.status_code == 422
+    assert grown(before, after, "allocator_jobs_ended_total", kind="allocate", status="succeeded") == 1
+    assert grown(before, after, "allocator_jobs_ended_total", kind="allocate", status="failed") == 1
+    run = {"kind": "allocate", "algorithm": "greedy"}
+    assert grown(before, after, "allocator_job_run_seconds_count", **run) == 1
+    assert 0 < grown(before, after, "allocator_job_run_seconds_sum", **run) < 60
+    assert grown(before, after, "allocator_job_wait_seconds_count", lane="interactive") == 2
+
+
+def test_levels_are_those_of_this_moment(client):
+    levels = samples(client)
+
+    assert levels[("allocator_jobs_waiting", ("lane", "interactive"))] == 0
+    assert levels[("allocator_jobs_running", ("lane", "training"))] == 0
+    assert levels[("allocator_workers",)] == 2
+    assert 1 <= levels[("allocator_workers_ready",)] <= 2
+    assert levels[("allocator_library_policies",)] == client.get("/readyz").json()["policies"]
+    assert levels[("allocator_database_bytes",)] >= 4096
+    assert levels[("process_resident_memory_bytes",)] > 1e6
+    assert client.get("/metrics").headers["content-type"].startswith("text/plain; version=0.0.4")
+
+
+def test_replaced_workers_are_counted(start_service):
+    service = start_service(workers=1).await_ready()
+    assert samples(service.client)[("allocator_worker_restarts_total",)] == 0
+
+    [worker] = workers_of(service.process.pid)
+    os.kill(worker, signal.SIGKILL)
+    while samples(service.client)[("allocator_worker_restarts_total",)] == 0:
+        assert service.process.poll() is None
+    assert samples(service.client)[("allocator_worker_restarts_total",)] == 1
+
+
+def workers_of(pid):
+    """The worker processes of a service, which multiprocessing starts as spawn_main."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            try:
+                with open(f"/proc/{entry}/stat") as stat, open(f"/proc/{entry}/cmdline") as command:
+                    parent = int(stat.read().rpartition(")")[2].split()[1])
+                    if parent == pid and "spawn_main" in command.read():
+                        found.append(int(entry))
+            except OSError:
+                continue
+    return found
