@@ -12,11 +12,15 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
+_SECONDS_A_DAY = 86_400.0
+
 
 class Settings(BaseSettings):
     """What an operator can set, by an environment variable ``ALLOCATOR_`` and the name in capitals."""
 
-    model_config = SettingsConfigDict(env_prefix="ALLOCATOR_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(
+        env_prefix="ALLOCATOR_", env_parse_none_str="null", frozen=True, extra="forbid"
+    )
 
     host: str = Field(default="127.0.0.1", description="Address the server listens on")
     port: int = Field(
@@ -58,6 +62,13 @@ class Settings(BaseSettings):
         default=3, ge=1, description="How often a job is tried whose worker or server died; then it fails"
     )
 
+    job_retention_days: float | None = Field(
+        default=30.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="Days until an ended job is deleted, with what it left; `null`: never",
+    )
+
     receive_timeout_s: float = Field(
         default=20.0,
         gt=0,
@@ -88,6 +99,11 @@ class Settings(BaseSettings):
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return True
+
+    @property
+    def job_retention_s(self) -> float | None:
+        """Seconds until an ended job is deleted; None: never."""
+        return None if self.job_retention_days is None else self.job_retention_days * _SECONDS_A_DAY
 
     @property
     def resolved_database_url(self) -> str:

@@ -74,6 +74,7 @@ def create_application(settings: Settings) -> FastAPI:
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
+                retention_s=settings.job_retention_s,
                 observer=metrics,
             )
             metrics.watch(service.load, store.count, database.size)

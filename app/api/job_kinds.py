@@ -39,5 +39,12 @@ def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
     return [
         JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive"),
         JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library),
-        JobKind(REGISTER, "app.jobs.work:register", "interactive", add_to_library),
+        # The weights are the job's artifact, and the policy's.
+        JobKind(
+            REGISTER,
+            "app.jobs.work:register",
+            "interactive",
+            add_to_library,
+            dropped_fields=frozenset({"checkpoint_base64"}),
+        ),
     ]

@@ -29,6 +29,7 @@ from app.jobs.store import Claim, JobStore, QueueLimit
 
 _SAVE_INTERVAL_S = 1.0
 _RECOVER_INTERVAL_S = 15.0
+_EXPIRE_INTERVAL_S, _EXPIRED_AT_ONCE = 600.0, 50
 _WRITE_ATTEMPTS, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
 _SETTLE_S = 20.0
 
@@ -65,7 +66,7 @@ class Dispatcher:
         The job table.
     owner
         In whose name the store takes jobs.
-    kinds, executor, max_queued, overrun_grace_s, observer
+    kinds, executor, max_queued, overrun_grace_s, retention_s, observer
         As given to :class:`app.jobs.service.JobService`.
     channels
         Who listens to which job.
@@ -81,6 +82,7 @@ class Dispatcher:
         *,
         max_queued: int,
         overrun_grace_s: float,
+        retention_s: float | None,
         observer: JobObserver,
     ) -> None:
         self._store = store
@@ -90,6 +92,7 @@ class Dispatcher:
         self._channels = channels
         self._max_queued = max_queued
         self._grace_s = overrun_grace_s
+        self._retention_s = retention_s
         self._observer = observer
         self._writer = ThreadPoolExecutor(1, thread_name_prefix="jobs-write")
         self._lanes = Lanes(executor.capacity)
@@ -351,8 +354,8 @@ class Dispatcher:
         self._wake.set()
 
     async def _keep_house(self) -> None:
-        """Store progress now and then, and look for jobs that nobody runs."""
-        recovered = time.monotonic()
+        """Store progress now and then, look for jobs that nobody runs, and forget those of long ago."""
+        recovered, expired = time.monotonic(), float("-inf")
         while not self._ended.is_set():
             await rung(self._ended, _SAVE_INTERVAL_S)
             try:
@@ -361,6 +364,9 @@ class Dispatcher:
                     recovered = time.monotonic()
                     await self._recover()
                     self._wake.set()
+                if time.monotonic() - expired >= _EXPIRE_INTERVAL_S:
+                    await self._expire()
+                    expired = time.monotonic()
             except Exception:
                 _log.exception("housekeeping failed; there will be another try")
 
@@ -374,6 +380,17 @@ class Dispatcher:
         await self._write(
             self._store.save_progress, [(run.job.id, run.job.attempt, run.progress) for run in due]
         )
+
+    async def _expire(self) -> None:
+        """Delete ended jobs that are too old, some at a time, so that nobody waits long to write."""
+        if self._retention_s is None:
+            return
+        before, gone, last = time.time() - self._retention_s, 0, _EXPIRED_AT_ONCE
+        while last == _EXPIRED_AT_ONCE and not self._ended.is_set():
+            last = await self._write(self._store.expire, before, _EXPIRED_AT_ONCE)
+            gone += last
+        if gone:
+            _log.info("jobs of long ago were deleted", extra={"jobs": gone})
 
     async def _recover(self) -> None:
         changed = await self._write(

@@ -39,6 +39,9 @@ class JobStatus(StrEnum):
         return self not in (JobStatus.QUEUED, JobStatus.RUNNING)
 
 
+FINISHED = tuple(status for status in JobStatus if status.finished)
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """How far a job is, and the best it has found.
@@ -202,9 +205,12 @@ class JobKind:
         Called inside the transaction that marks a job succeeded, in a thread of the web process; what it
         returns is the stored result. It gets the job as it was while running. What it raises rolls the
         transaction back, and the job fails with that reason. It must be quick: writers wait for it.
+    dropped_fields
+        Of the payload: large ones that nobody needs any more once the job has ended.
     """
 
     name: str
     work: str
     lane: Lane
     on_success: Callable[[Connection, Job, WorkResult], dict[str, Any]] | None = None
+    dropped_fields: frozenset[str] = frozenset()

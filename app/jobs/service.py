@@ -41,6 +41,8 @@ class JobService:
         How often a job may be lost with its worker or its process before it has failed.
     overrun_grace_s
         How long work may go on after it was cancelled or its time is up, before its worker is killed.
+    retention_s
+        How long ended jobs are kept, with what they left and their idempotency keys; None: for ever.
     observer
         Told of jobs as they begin and end.
     """
@@ -54,10 +56,12 @@ class JobService:
         max_queued: int = 64,
         max_attempts: int = 3,
         overrun_grace_s: float = 5.0,
+        retention_s: float | None = None,
         observer: JobObserver | None = None,
     ) -> None:
         owner = new_owner()
-        self._store = JobStore(database, owner, max_attempts)
+        dropped_fields = {kind.name: kind.dropped_fields for kind in kinds}
+        self._store = JobStore(database, owner, max_attempts, dropped_fields)
         self._channels = Channels()
         self._dispatcher = Dispatcher(
             self._store,
@@ -67,6 +71,7 @@ class JobService:
             self._channels,
             max_queued=max_queued,
             overrun_grace_s=overrun_grace_s,
+            retention_s=retention_s,
             observer=observer or NoObserver(),
         )
         self._stopping = False

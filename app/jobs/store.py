@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import time
 import uuid
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import sqlalchemy as sa
@@ -21,7 +22,17 @@ from sqlalchemy import Connection, RowMapping
 
 from app.jobs.errors import IdempotencyMismatch, InvalidCursor, QueueFull
 from app.jobs.failure import failure
-from app.jobs.model import Idempotency, Job, JobKind, JobPage, JobStatus, Lane, Progress, WorkResult
+from app.jobs.model import (
+    FINISHED,
+    Idempotency,
+    Job,
+    JobKind,
+    JobPage,
+    JobStatus,
+    Lane,
+    Progress,
+    WorkResult,
+)
 from app.jobs.tables import artifacts, idempotency_keys, jobs
 from app.jobs.transitions import (
     end,
@@ -80,12 +91,21 @@ class JobStore:
         Recorded with every job that is taken, see :mod:`app.jobs.owner`.
     max_attempts
         How often a job may be lost with its worker or its owner; then it fails.
+    dropped_fields
+        By kind of job, the fields of the payload that go when it ends.
     """
 
-    def __init__(self, database: Database, owner: str, max_attempts: int) -> None:
+    def __init__(
+        self,
+        database: Database,
+        owner: str,
+        max_attempts: int,
+        dropped_fields: Mapping[str, frozenset[str]] = MappingProxyType({}),
+    ) -> None:
         self._database = database
         self._owner = owner
         self._max_attempts = max_attempts
+        self._dropped_fields = dropped_fields
 
     def migrate(self) -> None:
         """Make the tables, or bring them to this version."""
@@ -222,9 +242,9 @@ class JobStore:
             if work.artifact is not None:
                 connection.execute(sa.insert(artifacts).values(job_id=job_id, data=work.artifact))
             if cancelled:
-                return end(connection, row, JobStatus.CANCELLED, progress, result=result)
+                return self._end(connection, row, JobStatus.CANCELLED, progress, result=result)
             done = replace(progress, fraction=1.0)
-            return end(connection, row, JobStatus.SUCCEEDED, done, result=result)
+            return self._end(connection, row, JobStatus.SUCCEEDED, done, result=result)
 
     def fail(self, job_id: str, attempt: int, error: dict[str, Any], progress: Progress) -> Job | None:
         """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
@@ -233,7 +253,7 @@ class JobStore:
             if row is None:
                 return None
             status = JobStatus.CANCELLED if row["cancel_requested"] else JobStatus.FAILED
-            return end(connection, row, status, progress, error=error)
+            return self._end(connection, row, status, progress, error=error)
 
     def lose(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
         """Give a job back whose worker died: it waits again, or has failed if that was the last attempt.
@@ -251,17 +271,23 @@ class JobStore:
             if row is None:
                 return None
             if row["cancel_requested"]:
-                return end(connection, row, JobStatus.CANCELLED, progress)
+                return self._end(connection, row, JobStatus.CANCELLED, progress)
             return requeue(connection, row, row["losses"], progress)
 
     def _lose(self, connection: Connection, row: RowMapping, reason: str, progress: Progress) -> Job:
         if row["cancel_requested"]:
-            return end(connection, row, JobStatus.CANCELLED, progress)
+            return self._end(connection, row, JobStatus.CANCELLED, progress)
         losses = row["losses"] + 1
         if losses >= self._max_attempts:
             error = failure("worker-lost", f"{reason}; given up after {losses} attempts")
-            return end(connection, row, JobStatus.FAILED, progress, error=error)
+            return self._end(connection, row, JobStatus.FAILED, progress, error=error)
         return requeue(connection, row, losses, progress)
+
+    def _end(
+        self, connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
+    ) -> Job:
+        dropped = self._dropped_fields.get(row["kind"], frozenset())
+        return end(connection, row, status, progress, dropped=dropped, **values)
 
     def recover(self, kinds: Iterable[str], alive: Callable[[str], bool]) -> list[Job]:
         """Give back the running jobs of owners that are dead, and fail jobs of kinds that are no more.
@@ -288,7 +314,7 @@ class JobStore:
                 )
             for row in connection.execute(queued_of_other_kinds(kinds)).mappings().all():
                 error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
-                changed.append(end(connection, row, JobStatus.FAILED, progress_of(row), error=error))
+                changed.append(self._end(connection, row, JobStatus.FAILED, progress_of(row), error=error))
         return changed
 
     def save_progress(self, items: Iterable[tuple[str, int, Progress]]) -> None:
@@ -321,7 +347,7 @@ class JobStore:
         with self._database.write() as connection:
             row = find(connection, job_id)
             if row["status"] == JobStatus.QUEUED:
-                return end(connection, row, JobStatus.CANCELLED, progress_of(row)), JobStatus.QUEUED
+                return self._end(connection, row, JobStatus.CANCELLED, progress_of(row)), JobStatus.QUEUED
             if row["status"] == JobStatus.RUNNING:
                 connection.execute(
                     sa.update(jobs).where(jobs.c.number == row["number"]).values(cancel_requested=True)
@@ -373,6 +399,31 @@ class JobStore:
                 sa.select(artifacts.c.data).where(artifacts.c.job_id == job_id)
             )
             return data
+
+    def expire(self, before: float, limit: int) -> int:
+        """Delete finished jobs with what they left and the idempotency keys they came with.
+
+        Parameters
+        ----------
+        before
+            Seconds since 1970: only jobs that ended before then.
+        limit
+            How many at most, the oldest first: other writers wait that long.
+
+        Returns
+        -------
+        int
+            How many were deleted.
+        """
+        oldest = (
+            sa.select(jobs.c.number)
+            .where(jobs.c.finished_at < before)
+            .order_by(jobs.c.finished_at)
+            .limit(limit)
+        )
+        with self._database.write() as connection:
+            ended = jobs.c.number.in_(oldest), jobs.c.status.in_(FINISHED)
+            return connection.execute(sa.delete(jobs).where(*ended)).rowcount
 
     def waiting(self) -> dict[Lane, int]:
         """Return how many jobs wait in each lane that has any."""

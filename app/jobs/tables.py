@@ -31,6 +31,7 @@ jobs = sa.Table(
     sa.Column("created_at", sa.Double, nullable=False),
     sa.Column("started_at", sa.Double),
     sa.Column("finished_at", sa.Double),
+    sa.Index("ix_jobs_finished_at", "finished_at"),
     sa.Index("ix_jobs_status_lane_number", "status", "lane", "number"),
     sqlite_autoincrement=True,
 )

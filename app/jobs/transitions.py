@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from datetime import UTC, datetime
 from typing import Any
 
@@ -58,9 +58,13 @@ def end(
     *,
     result: dict[str, Any] | None = None,
     error: dict[str, Any] | None = None,
+    dropped: Set[str] = frozenset(),
 ) -> Job:
-    """Move a job to a final state."""
-    return change(connection, row, status, progress, result=result, error=error, finished_at=time.time())
+    """Move a job to a final state, its payload without the dropped fields."""
+    values: dict[str, Any] = {"result": result, "error": error, "finished_at": time.time()}
+    if dropped:
+        values["payload"] = {name: value for name, value in row["payload"].items() if name not in dropped}
+    return change(connection, row, status, progress, **values)
 
 
 def requeue(connection: Connection, row: RowMapping, losses: int, progress: Progress) -> Job:

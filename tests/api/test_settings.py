@@ -39,3 +39,10 @@ def test_database_url_comes_before_the_data_folder(tmp_path):
 def test_nonsense_is_refused(name, value):
     with pytest.raises(ValidationError):
         Settings(**{name: value})
+
+
+def test_null_keeps_jobs_for_ever(monkeypatch):
+    assert Settings().job_retention_s == 30 * 86_400
+    monkeypatch.setenv("ALLOCATOR_JOB_RETENTION_DAYS", "null")
+
+    assert Settings().job_retention_s is None
