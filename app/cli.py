@@ -16,6 +16,7 @@ import uvicorn
 from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from sqlalchemy import make_url
 
 from app.api.access.keys import KeyStore, Role
 from app.api.allocation_models import Allocation, AllocationRequest
@@ -30,7 +31,9 @@ from app.jobs.work_context import WorkContext
 from app.library.seeding import add_policies, read_policies, seed_library
 from app.settings import Settings
 from app.solvers.registry import parse_parameters
+from policy_store.backup import back_up
 from policy_store.database import Database
+from policy_store.errors import BackupFailed
 from policy_store.library import PolicyLibrary
 
 PLAIN_LINE_EVERY_S = 2.0
@@ -185,6 +188,24 @@ def revoke_key(key_id: Annotated[str, typer.Argument(help="As listed.")], data_d
         if not store.revoke(key_id):
             typer.echo(f"no key that is in use has the id {key_id!r}", err=True)
             raise typer.Exit(1)
+
+
+@application.command()
+def backup(
+    file: Annotated[Path, typer.Argument(help="Where to; it must not exist yet.")], data_dir: DataDir = None
+) -> None:
+    """Copy the database, also while the service runs, and check the copy.
+
+    To go back to it, stop the service and put the copy in the place of allocator.sqlite3; remove the files
+    allocator.sqlite3-wal and allocator.sqlite3-shm beside it.
+    """
+    source = make_url(_settings(data_dir=data_dir).resolved_database_url).database
+    try:
+        size = back_up(Path(str(source)), file)
+    except BackupFailed as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    typer.echo(f"{file}: {size} bytes", err=True)
 
 
 def _settings(**given: Any) -> Settings:

@@ -3,6 +3,7 @@
 PolicyStoreError
  ├─ UnsupportedDatabase     the URL names a database that the store cannot use
  ├─ MigrationFailed         the tables cannot be brought to this version
+ ├─ BackupFailed            the database cannot be copied
  ├─ NestedWrite             a thread that is inside a write transaction asked for a second one
  ├─ PolicyNotFound          no policy has that id
  ├─ DuplicatePolicy         another policy already has that id
@@ -18,6 +19,7 @@ Errors of the database itself (disk full, locked for longer than the busy timeou
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 
 class PolicyStoreError(Exception):
@@ -39,6 +41,15 @@ class MigrationFailed(PolicyStoreError):
     def __init__(self, script_location: str, reason: str) -> None:
         super().__init__(f"migrations of {script_location} failed: {reason}")
         self.script_location = script_location
+        self.reason = reason
+
+
+class BackupFailed(PolicyStoreError):
+    """The database cannot be copied; the target is not there."""
+
+    def __init__(self, source: Path, reason: str) -> None:
+        super().__init__(f"no backup of {source}: {reason}")
+        self.source = source
         self.reason = reason
 
 

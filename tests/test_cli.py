@@ -153,3 +153,38 @@ def test_the_log_tells_of_requests_and_jobs_and_never_of_keys(invoke, serve):
     told = [line["event"] for line in lines if line.get("job_id") == job_id]
     assert told == ["job taken in", "job ended"]
     assert ids[0] in {line.get("request_id") for line in lines if line.get("job_id") == job_id}
+
+
+def test_a_backup_of_a_running_service_is_restored(invoke, serve, tmp_path):
+    client, process, _ = serve()
+    problem = json.loads((ROOT / "app/examples/paper-5x10.json").read_text("utf-8"))
+    before = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
+    policies = client.get("/library").json()["policies"]
+    copy = tmp_path / "elsewhere" / "backup.sqlite3"
+    copy.parent.mkdir()
+    made = invoke("backup", str(copy))
+    assert made.exit_code == 0, made.stderr
+    after = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
+    assert invoke("backup", str(copy)).exit_code == 1
+    process.kill()
+    process.wait()
+
+    for file in tmp_path.glob("allocator.sqlite3*"):
+        file.unlink()
+    copy.rename(tmp_path / "allocator.sqlite3")
+    restored, _, _ = serve()
+
+    assert restored.get(f"/jobs/{before['job_id']}").json()["result"] == before
+    assert restored.get(f"/jobs/{after['job_id']}").status_code == 404
+    assert restored.get("/library").json()["policies"] == policies
+    for policy in policies[:3]:
+        assert restored.get(f"/library/{policy['id']}/checkpoint").status_code == 200
+    assert restored.post("/allocate", json={**problem, "algorithm": "greedy"}).status_code == 200
+
+
+def test_a_backup_of_nothing_is_refused_and_makes_nothing(invoke, tmp_path):
+    refused = invoke("backup", str(tmp_path / "copy"))
+
+    assert refused.exit_code == 1
+    assert "allocator.sqlite3" in refused.stderr
+    assert list(tmp_path.iterdir()) == []
