@@ -20,3 +20,17 @@ class GeneticParameters(Parameters):
         default=0.8, ge=0, le=1, description="Probability that two parents are crossed"
     )
     mutation_rate: float = Field(default=0.05, ge=0, le=1, description="Probability that a gene is redrawn")
+
+
+class LocalSearchParameters(Parameters):
+    """How long the local search goes on."""
+
+    moves: int | None = Field(
+        default=None, ge=0, le=10_000_000_000, description="Moves tried, over all rounds; null: by size"
+    )
+    restarts: int | None = Field(
+        default=None,
+        ge=0,
+        le=1_000_000,
+        description="Rounds of cooling after the first; null: by size and moves",
+    )

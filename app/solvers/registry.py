@@ -51,7 +51,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
     for algorithm in (
         Algorithm(
             "transfer_qmix",
-            "Copies the most similar source policy of the library and fine-tunes it (Algorithm 2)",
+            "Carries a source policy of the library over to the problem; Algorithm 2 in paper mode",
             "app.learning.transfer:TransferQmix",
             "app.learning.parameters:TransferQmixParameters",
             learns=True,
@@ -74,6 +74,12 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "The paper's genetic algorithm (Table 2)",
             "app.solvers.genetic:GeneticAlgorithm",
             "app.solvers.parameters:GeneticParameters",
+        ),
+        Algorithm(
+            "local_search",
+            "Simulated annealing over plans with incremental evaluation, from the greedy rule's plan",
+            "app.solvers.local_search.solver:LocalSearch",
+            "app.solvers.parameters:LocalSearchParameters",
         ),
         Algorithm(
             "greedy",

@@ -24,6 +24,7 @@ QUICK = {
     "qmix": {**LEARNING, "mode": "paper"},
     "dqn": LEARNING,
     "ga": {"num_total": 8, "iteration": 10},
+    "local_search": {"moves": 3000, "restarts": 1},
 }
 SHAPES = ((2, 3, 2), (3, 4, 1))
 

@@ -9,12 +9,11 @@ import numpy as np
 from app.learning.universal.best_plan import BestPlan
 from app.simulation.arrays import ProblemArrays
 from app.solvers.local_search.annealing import actions_of, new_search, set_routes
+from app.solvers.local_search.effort import default_restarts
 from app.solvers.local_search.improvement import Cooling, improve
 from app.solvers.protocol import StopCriterion
 
-_COOLING = Cooling(hot=0.1, cold=0.001)
-_TOLD = 20
-"""Times that progress is told."""
+_COOLING = Cooling()
 
 
 def polish(
@@ -40,20 +39,16 @@ def polish(
     stop
         Asked every few milliseconds.
     watch
-        Told the share of the moves done, a few times.
+        Told the share of the moves done, now and then.
     """
-    if moves <= 0 or stop():
+    if moves == 0 or stop():
         return
     search = new_search(arrays)
     set_routes(search, best.actions)
-    told = 0
 
-    def tell(done: int) -> None:
-        nonlocal told
-        if done * _TOLD >= (told + 1) * moves:
-            told = done * _TOLD // moves
-            best.consider(actions_of(search)[None])
-            watch(done / moves)
+    def tell(done: float, _ended: int) -> None:
+        best.consider(actions_of(search)[None])
+        watch(done)
 
-    improve(search, rng, moves, _COOLING, stop, tell)
+    improve(search, rng, moves, default_restarts(arrays, moves) + 1, _COOLING, stop, tell)
     best.consider(actions_of(search)[None])

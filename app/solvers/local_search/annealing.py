@@ -110,6 +110,32 @@ def keep_best(search: Search) -> bool:
 
 
 @compiled
+def drop_useless(search: Search) -> None:
+    """Take the visits that unload nothing out of the current plan, which makes it legal, and keep it if best.
+
+    What follows in the route moves a step ahead and may find another order at its targets, so other visits
+    can become useless; each pass leaves fewer visits, so it ends.
+    """
+    arrays, routes, change = search.arrays, search.routes, search.change
+    m = routes.length.shape[0]
+    while routes.total[USELESS] > 0.5:
+        for i in range(m):
+            s = 0
+            while s < routes.length[i]:
+                if not routes.useless[s * m + i]:
+                    s += 1
+                    continue
+                change.uav[1] = NONE
+                for q in range(s, routes.length[i] - 1):
+                    change.target[0, q] = routes.target[i, q + 1]
+                propose(routes, change, 0, i, s, routes.length[i] - 1)
+                # The way without it is not longer, so it is feasible; this works out distances and times.
+                feasible(arrays, change)
+                apply(arrays, routes, change, extra_distance(arrays, routes, change))
+    keep_best(search)
+
+
+@compiled
 def anneal(
     search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float
 ) -> int:

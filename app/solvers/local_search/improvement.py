@@ -1,4 +1,4 @@
-"""Annealing in pieces: as many moves as were asked for, unless a stop criterion ends it early."""
+"""Rounds of annealing in pieces: as many moves as were asked for, unless a stop criterion ends it early."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import ProblemArrays
-from app.solvers.local_search.annealing import Search, actions_of, anneal, set_routes
+from app.solvers.local_search.annealing import Search, anneal, drop_useless
+from app.solvers.local_search.effort import move_cost
 from app.solvers.protocol import StopCriterion
 
-_PIECE = 4000
-"""Moves between two looks at the stop criterion, for few materials and steps: about 2 ms."""
+_PIECE = 6000
+"""Moves between two looks at the stop criterion times what a move costs: about 2 ms."""
+
+_TOLD = 32
+"""Times that progress is told, beside the ends of the rounds."""
 
 
 class Cooling(NamedTuple):
@@ -27,64 +31,78 @@ class Cooling(NamedTuple):
     """
 
     hot: float = 0.1
-    cold: float = 0.001
-    penalty: float = 0.01
+    cold: float = 0.002
+    penalty: float = 0.03
 
 
-def can_improve(search: Search) -> bool:
-    """Whether there is any UAV that may be sent anywhere."""
-    return len(search.near.active) > 0 and len(search.near.wanted) > 0
+Watch = Callable[[float, int], None]
+"""Takes the share of the moves done and the number of rounds ended."""
 
 
 def improve(
     search: Search,
     rng: np.random.Generator,
     moves: int,
+    rounds: int,
     cooling: Cooling,
     stop: StopCriterion,
-    watch: Callable[[int], None],
+    watch: Watch,
 ) -> None:
-    """Anneal one round from the search's current plan.
+    """Anneal from the search's current plan, each round from where the one before ended.
 
     Parameters
     ----------
     search
-        Changed; its incumbent is the best plan of the round and of before.
+        Changed; its incumbent is the best plan of all rounds and of before.
     rng
         The only source of randomness.
-    moves
-        How many to try.
+    moves, rounds
+        How many moves to try, over all rounds, at least 1.
     cooling
         Temperatures.
     stop
         Asked every few milliseconds. It does not change what the moves before it were.
     watch
-        Told the moves done, after each piece.
+        Told now and then, and after each round.
     """
-    if not can_improve(search):
-        return
-    scale = level_scale(search.arrays)
-    piece = _piece(search.arrays)
-    done = 0
+    for number in range(rounds):
+        before, after = moves * number // rounds, moves * (number + 1) // rounds
+
+        def tell(done: int, before: int = before, number: int = number) -> None:
+            watch((before + done) / moves, number)
+
+        if stop():
+            return
+        if len(search.near.active) and len(search.near.wanted):
+            _round(search, rng, after - before, -(-moves // _TOLD), cooling, stop, tell)
+        watch(after / max(moves, 1), number + 1)
+
+
+def _round(
+    search: Search,
+    rng: np.random.Generator,
+    moves: int,
+    tell_every: int,
+    cooling: Cooling,
+    stop: StopCriterion,
+    tell: Callable[[int], None],
+) -> None:
+    """One round; the plan at its end is made legal."""
+    scale = _level_scale(search.arrays)
+    piece = max(100, round(_PIECE / move_cost(search.arrays)))
+    done, told = 0, 0
     while done < moves and not stop():
         following = min(done + piece, moves)
         hot, cold = (cooling.hot * (cooling.cold / cooling.hot) ** (n / moves) for n in (done, following))
         anneal(search, rng, following - done, hot * scale, cold * scale, cooling.penalty * scale)
         done = following
-        watch(done)
+        if done - told >= tell_every:
+            told = done
+            tell(done)
+    drop_useless(search)
 
 
-def return_to_best(search: Search) -> None:
-    """Make the incumbent the current plan."""
-    set_routes(search, actions_of(search))
-
-
-def level_scale(arrays: ProblemArrays) -> float:
+def _level_scale(arrays: ProblemArrays) -> float:
     """Return the largest level of a target that needs anything; never 0."""
     levels = arrays.level[0][arrays.need_total[0] > 0]
     return max(float(levels.max(initial=0.0)), 1e-12)
-
-
-def _piece(arrays: ProblemArrays) -> int:
-    """Longer routes and more materials make a move dearer."""
-    return max(100, round(_PIECE / (1 + arrays.shape[2] / 16 + int(arrays.max_steps[0]) / 20)))

@@ -1,0 +1,261 @@
+"""The local search: incremental evaluation against the simulator, tiny problems against brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from brute_force import best_reward
+from problems import random_problem
+from referee import replay
+
+from app.domain.problem import Objective
+from app.domain.records import problem_to_record
+from app.simulation.arrays import compile_problem
+from app.simulation.explain import reward_of, rewards_of
+from app.simulation.generator import generate
+from app.simulation.simulator import UNLOADS_NOTHING
+from app.solvers.greedy import greedy_plan
+from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
+from app.solvers.local_search.change import apply, extra_distance, feasible, undo
+from app.solvers.local_search.effort import default_moves, default_restarts
+from app.solvers.local_search.improvement import Cooling, improve
+from app.solvers.local_search.moves import draw_move
+from app.solvers.local_search.routes import USELESS
+from app.solvers.local_search.solver import LocalSearch
+from app.solvers.parameters import LocalSearchParameters
+from app.solvers.protocol import SolverContext
+from app.solvers.stop import never
+
+
+def quiet(*_told):
+    """Nobody is told."""
+
+
+def solve(problem, *, seed=1, stop=never, report=quiet, **parameters):
+    solver = LocalSearch(LocalSearchParameters(**parameters), SolverContext())
+    return solver.solve(problem, seed, stop, report)
+
+
+def current_actions(search):
+    """The current plan, not the incumbent, as joint actions (S, M)."""
+    routes, home = search.routes, search.arrays.level.shape[1]
+    used = np.arange(routes.target.shape[1])[None, :] < routes.length[:, None]
+    return np.where(used, routes.target, home).T.copy()
+
+
+def assert_evaluated(search):
+    """The totals are those of the current plan; where a visit is useless, the simulator says so too."""
+    routes, arrays = search.routes, search.arrays
+    judged = rewards_of(arrays, current_actions(search)[None])
+    if routes.total[USELESS] > 0.5:
+        assert judged.rule[0] == UNLOADS_NOTHING
+        return
+    assert judged.rule[0] == 0
+    scale = 1 + abs(judged.distance[0])
+    np.testing.assert_allclose(
+        routes.total[:2], [judged.satisfaction[0], judged.distance[0]], rtol=0, atol=1e-9 * scale
+    )
+
+
+def able(rng, count, **sizes):
+    """Searches of random problems in which somebody may fly, with every option of the specification."""
+    found = []
+    while len(found) < count:
+        problem = random_problem(rng, **sizes)
+        search = new_search(compile_problem(problem))
+        if len(search.near.active) and len(search.near.wanted):
+            found.append((problem, search))
+    return found
+
+
+def test_totals_stay_those_of_the_simulator_through_random_moves():
+    rng = np.random.default_rng(11)
+    applied = undone = useless = 0
+    for problem, search in able(rng, 150, max_uavs=7, max_targets=9):
+        set_routes(search, greedy_plan(problem).as_array())
+        assert_evaluated(search)
+        for _ in range(60):
+            if not draw_move(search.routes, search.near, search.change, rng):
+                continue
+            if not feasible(search.arrays, search.change):
+                continue
+            extra = extra_distance(search.arrays, search.routes, search.change)
+            apply(search.arrays, search.routes, search.change, extra)
+            applied += 1
+            if rng.random() < 0.4:
+                undo(search.routes, search.change)
+                undone += 1
+            useless += search.routes.total[USELESS] > 0.5
+            assert_evaluated(search)
+    assert min(applied - undone, undone, useless) > 300
+
+
+def test_undoing_leaves_no_trace():
+    rng = np.random.default_rng(12)
+    for problem, search in able(rng, 60):
+        set_routes(search, greedy_plan(problem).as_array())
+        for _ in range(40):
+            before = [each.copy() for each in search.routes]
+            lengths = search.routes.length.copy()
+            if not draw_move(search.routes, search.near, search.change, rng):
+                continue
+            if not feasible(search.arrays, search.change):
+                continue
+            apply(
+                search.arrays,
+                search.routes,
+                search.change,
+                extra_distance(search.arrays, search.routes, search.change),
+            )
+            if rng.random() < 0.3:
+                continue
+            undo(search.routes, search.change)
+            assert np.array_equal(search.routes.length, lengths)
+            for name, now, then in zip(search.routes._fields, search.routes, before, strict=True):
+                if name in ("first", "total"):
+                    assert np.array_equal(now, then), name
+            for i, length in enumerate(lengths):
+                slots = np.arange(length) * len(lengths) + i
+                for name in ("load", "need", "earned", "useless", "following", "preceding"):
+                    now = getattr(search.routes, name)
+                    assert np.array_equal(now[slots], before[search.routes._fields.index(name)][slots]), name
+                assert np.array_equal(search.routes.target[i, :length], before[0][i, :length])
+
+
+def test_annealed_plans_are_legal_and_earn_what_the_search_says():
+    rng = np.random.default_rng(13)
+    for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
+        scale = max(float(search.arrays.level.max()), 1e-9)
+        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale)
+        assert_evaluated(search)
+        drop_useless(search)
+        assert search.routes.total[USELESS] == 0
+        assert_evaluated(search)
+        record, rows = problem_to_record(problem), actions_of(search).tolist()
+        assert replay(record, rows)["reward"] == pytest.approx(search.best[0], abs=1e-9)
+
+
+def test_tiny_problems_are_solved_to_the_optimum():
+    rng = np.random.default_rng(14)
+    solved = 0
+    while solved < 40:
+        problem = random_problem(rng, max_uavs=3, max_targets=4)
+        problem = replace(problem, max_steps=min(problem.max_steps, 3 if problem.n_uavs < 3 else 2))
+        best = best_reward(problem_to_record(problem))
+        found = reward_of(problem, solve(problem, moves=20_000).plan)
+        assert found == pytest.approx(best, abs=1e-9)
+        solved += best > 0.01
+
+
+def test_a_plan_in_which_something_is_useless_at_the_end_is_not_lost():
+    # So large that some visit is always useless while it is hot.
+    problem = generate("deadline", 60, 150, 3, np.random.default_rng(5))
+    greedy = reward_of(problem, greedy_plan(problem))
+    assert reward_of(problem, solve(problem, moves=400_000).plan) > 1.05 * greedy
+
+
+EDGES = {
+    "one target": {"size": (4, 1, 2)},
+    "one UAV": {"size": (1, 6, 2)},
+    "one of each": {"size": (1, 1, 1)},
+    "many materials": {"size": (5, 8, 64)},
+    "one step": {"size": (5, 8, 2), "max_steps": 1},
+    "a hundred steps": {"size": (4, 12, 2), "max_steps": 100},
+    "distance costs nothing": {"size": (5, 8, 2), "objective": Objective(0.0)},
+    "distance costs all": {"size": (5, 8, 2), "objective": Objective(1e9)},
+    "the way home costs": {"size": (5, 8, 2), "objective": Objective(1.0, charge_return=True)},
+    "no way home": {"size": (5, 8, 2), "objective": Objective(1.0, return_to_base=False)},
+}
+
+
+@pytest.mark.parametrize("edge", EDGES.values(), ids=EDGES)
+def test_edges_are_legal_and_not_below_the_greedy_rule(edge):
+    for family in ("uniform", "mid_mission", "deadline"):
+        problem = generate(family, *edge["size"], np.random.default_rng(6))
+        problem = replace(
+            problem,
+            max_steps=edge.get("max_steps", problem.max_steps),
+            objective=edge.get("objective", problem.objective),
+        )
+        plan = solve(problem, moves=5000).plan
+        rows = [list(row) for row in plan.assignment]
+        earned = replay(problem_to_record(problem), rows)["reward"]
+        assert earned >= reward_of(problem, greedy_plan(problem)) - 1e-9
+
+
+@pytest.mark.parametrize("change", ["nobody may fly", "nobody carries", "nothing is needed", "no level"])
+def test_where_nothing_can_be_earned_everybody_stays_at_home(change):
+    problem = generate("uniform", 3, 4, 2, np.random.default_rng(7))
+    uavs, targets = problem.uavs, problem.targets
+    if change == "nobody may fly":
+        uavs = tuple(replace(u, ret=True) for u in uavs)
+    elif change == "nobody carries":
+        uavs = tuple(replace(u, loadlist=(0.0, 0.0)) for u in uavs)
+    elif change == "nothing is needed":
+        targets = tuple(replace(t, loadlist=(0.0, 0.0)) for t in targets)
+    else:
+        targets = tuple(replace(t, level=0.0) for t in targets)
+    solution = solve(replace(problem, uavs=uavs, targets=targets), moves=1000)
+    assert solution.plan.assignment == ((4, 4, 4),)
+
+
+def test_asking_the_stop_criterion_changes_nothing():
+    problem = generate("uniform", 6, 9, 2, np.random.default_rng(8))
+    asked = 0
+
+    def counting():
+        nonlocal asked
+        asked += 1
+        return False
+
+    first = solve(problem, moves=60_000, restarts=2)
+    again = solve(problem, moves=60_000, restarts=2, stop=counting)
+    assert (first.plan, first.history) == (again.plan, again.history)
+    assert asked > 15
+    assert first.history.epoch == [0, 1, 2, 3]
+    assert first.history.reward == sorted(first.history.reward)
+
+
+def test_stopped_in_the_middle_it_returns_what_it_has():
+    problem = generate("uniform", 10, 20, 3, np.random.default_rng(9))
+    for allowed in (0, 1, 5, 50):
+        left = allowed
+
+        def stop():
+            nonlocal left
+            left -= 1
+            return left < 0
+
+        solution = solve(problem, moves=10**9, stop=stop)
+        earned = replay(problem_to_record(problem), [list(row) for row in solution.plan.assignment])["reward"]
+        assert earned >= max(solution.history.reward) - 1e-9
+        assert solution.history.epoch in ([0], [0, 1])
+
+
+def test_what_was_used_comes_back():
+    problem = generate("uniform", 2, 3, 2, np.random.default_rng(10))
+    arrays = compile_problem(problem)
+    used = solve(problem).parameters
+    assert (used.moves, used.restarts) == (
+        default_moves(arrays),
+        default_restarts(arrays, default_moves(arrays)),
+    )
+    assert solve(problem, moves=0).history.epoch[0] == 0
+    given = LocalSearchParameters(moves=300, restarts=4)
+    assert solve(problem, moves=300, restarts=4).parameters == given
+
+
+def test_moves_are_all_made_whatever_the_rounds():
+    search = new_search(compile_problem(generate("uniform", 4, 6, 2, np.random.default_rng(11))))
+    told = []
+    improve(
+        search,
+        np.random.default_rng(1),
+        1001,
+        7,
+        Cooling(),
+        never,
+        lambda done, ended: told.append((done, ended)),
+    )
+    assert told[-1] == (1.0, 7)
+    assert told == sorted(told)
