@@ -65,13 +65,13 @@ class GeneticAlgorithm:
         flight = Flight(
             arrays, new_episodes(arrays, 1), np.empty(problem.n_uavs, np.int64), np.empty(genes, np.int64)
         )
-        population = rng.integers(0, problem.n_targets + 1, (self.parameters.num_total, *genes))
-        # Flying nowhere is a plan too: the answer is legal and earns 0 however early it must stop.
-        population[0] = problem.n_targets
-        fitness = np.full(len(population), -np.inf)
-        unborn = population[:1] if stop() else population
-        for c, chromosome in enumerate(unborn):
-            fitness[c] = decode(flight, chromosome)
+        size, generations = self.parameters.num_total, self.parameters.iteration
+        rates = self.parameters.crossover_rate, self.parameters.mutation_rate
+        slices = _slices(size, problem.max_steps * problem.n_uavs)
+        population, fitness = np.empty((size, *genes), np.int64), np.full(size, -np.inf)
+        complete = _begin(flight, population, fitness, slices, rng, stop)
+        if len(slices) > 1:
+            children, child_fitness = np.empty_like(population), np.empty_like(fitness)
 
         def incumbent() -> Plan:
             decode(flight, population[fitness.argmax()])
@@ -79,17 +79,74 @@ class GeneticAlgorithm:
 
         history = History()
         history.add(0, float(fitness.max()))
-        generations, done = self.parameters.iteration, 0
-        chunk = max(1, CHUNK_GENES // population.size)
-        while done < generations and not stop():
-            best = np.empty(min(chunk, generations - done))
-            rates = self.parameters.crossover_rate, self.parameters.mutation_rate
-            population, fitness = evolve(flight, population, fitness, best, rates, rng)
+        done = 0
+        while complete and done < generations and not stop():
+            if len(slices) == 1:
+                best = np.empty(min(max(1, CHUNK_GENES // population.size), generations - done))
+                population, fitness = evolve(flight, population, fitness, best, rates, rng)
+            else:
+                complete = _next(
+                    flight, population, fitness, children, child_fitness, slices, rates, rng, stop
+                )
+                population, children = children, population
+                fitness, child_fitness = child_fitness, fitness
+                best = fitness.max(keepdims=True)
             for reward in best:
                 done += 1
                 history.add(done, float(reward))
             report(Progress(done / generations, done, float(best[-1]), incumbent()))
         return Solution(incumbent(), history, self.parameters)
+
+
+def _slices(size: int, genes: int) -> list[tuple[int, int]]:
+    """Cut a population of chromosomes into ranges that take some milliseconds each."""
+    length = max(1, CHUNK_GENES // genes)
+    return [(first, min(first + length, size)) for first in range(0, size, length)]
+
+
+def _begin(
+    flight: Flight,
+    population: Integers,
+    fitness: Floats,
+    slices: list[tuple[int, int]],
+    rng: np.random.Generator,
+    stop: StopCriterion,
+) -> bool:
+    """Draw and fly the first generation; False if it was stopped, then at least the first has flown."""
+    home = flight.arrays.level.shape[1]
+    for first, last in slices:
+        if first > 0 and stop():
+            return False
+        population[first:last] = rng.integers(0, home + 1, population[first:last].shape)
+        if first == 0:
+            # Flying nowhere is a plan too: the answer is legal and earns 0 however early it must stop.
+            population[0] = home
+            fitness[0] = decode(flight, population[0])
+            if stop():
+                return False
+        for c in range(max(1, first), last):
+            fitness[c] = decode(flight, population[c])
+    return True
+
+
+def _next(
+    flight: Flight,
+    population: Integers,
+    fitness: Floats,
+    children: Integers,
+    child_fitness: Floats,
+    slices: list[tuple[int, int]],
+    rates: tuple[float, float],
+    rng: np.random.Generator,
+    stop: StopCriterion,
+) -> bool:
+    """Breed one generation; False if it was stopped, then the best parent and some children are in it."""
+    child_fitness[:] = -np.inf
+    for first, last in slices:
+        if first > 0 and stop():
+            return False
+        breed(flight, population, fitness, children, child_fitness, first, last, rates, rng)
+    return True
 
 
 def _check_size(num_total: int, problem: Problem) -> None:
@@ -165,25 +222,59 @@ def evolve(
     population, fitness
         After G generations.
     """
-    crossover_rate, mutation_rate = rates
-    size, steps, m = population.shape
-    home = flight.arrays.level.shape[1]
     children, child_fitness = np.empty_like(population), np.empty_like(fitness)
+    # A literal 0 would be a type of its own, and the call from Python compile a second time.
+    start = int(np.int64(0))
     for generation in range(len(best)):
-        children[0], child_fitness[0] = population[np.argmax(fitness)], fitness.max()
-        for c in range(1, size):
-            mother = population[_winner(fitness, rng)]
-            father = population[_winner(fitness, rng)] if rng.random() < crossover_rate else mother
-            for i in range(m):
-                parent = mother if rng.random() < 0.5 else father
-                for s in range(steps):
-                    redrawn = rng.random() < mutation_rate
-                    children[c, s, i] = rng.integers(0, home + 1) if redrawn else parent[s, i]
-            child_fitness[c] = decode(flight, children[c])
+        breed(flight, population, fitness, children, child_fitness, start, len(fitness), rates, rng)
         population, children = children, population
         fitness, child_fitness = child_fitness, fitness
         best[generation] = fitness.max()
     return population, fitness
+
+
+@njit(cache=True, error_model="numpy")
+def breed(
+    flight: Flight,
+    population: Integers,
+    fitness: Floats,
+    children: Integers,
+    child_fitness: Floats,
+    first: int,
+    last: int,
+    rates: tuple[float, float],
+    rng: np.random.Generator,
+) -> None:
+    """Breed some children of a generation; the first child is the best parent.
+
+    Parameters
+    ----------
+    flight
+        Scratch space.
+    population, fitness
+        (P, S, M) parents and (P,) their rewards.
+    children, child_fitness
+        The same of the next generation, overwritten where children are born.
+    first, last
+        The first child, and the one after the last.
+    rates, rng
+        As in :func:`evolve`.
+    """
+    crossover_rate, mutation_rate = rates
+    _, steps, m = population.shape
+    home = flight.arrays.level.shape[1]
+    if first == 0:
+        children[0], child_fitness[0] = population[np.argmax(fitness)], fitness.max()
+        first = 1
+    for c in range(first, last):
+        mother = population[_winner(fitness, rng)]
+        father = population[_winner(fitness, rng)] if rng.random() < crossover_rate else mother
+        for i in range(m):
+            parent = mother if rng.random() < 0.5 else father
+            for s in range(steps):
+                redrawn = rng.random() < mutation_rate
+                children[c, s, i] = rng.integers(0, home + 1) if redrawn else parent[s, i]
+        child_fitness[c] = decode(flight, children[c])
 
 
 @njit(cache=True, error_model="numpy")

@@ -62,3 +62,46 @@ def test_a_population_that_would_not_fit_is_refused():
     problem = generate("clustered", 1000, 5, 1, np.random.default_rng(4))
     with pytest.raises(ProblemTooLarge, match=r"10000 times 6 steps times 1000 UAVs are 60000000 genes"):
         solve(problem, num_total=10_000)
+
+
+class After:
+    """Stops at a number of questions, and would have it that the work goes on at the next."""
+
+    def __init__(self, questions):
+        self.questions = questions
+        self.asked = 0
+
+    def __call__(self):
+        self.asked += 1
+        return self.asked == self.questions
+
+
+@pytest.mark.parametrize("chunk", [1, 90, 1000])
+def test_slices_change_nothing_but_how_often_stop_is_asked(monkeypatch, chunk):
+    problem = generate("deadline", 6, 9, 2, np.random.default_rng(2))
+    never_stopped, often = After(0), After(0)
+    whole = solve(problem, stop=never_stopped, iteration=20)
+    monkeypatch.setattr("app.solvers.genetic.CHUNK_GENES", chunk)
+    sliced = solve(problem, stop=often, iteration=20)
+
+    assert (sliced.plan, sliced.history) == (whole.plan, whole.history)
+    assert often.asked > never_stopped.asked
+    if chunk == 1:
+        # Once for every chromosome of every generation.
+        assert often.asked >= 30 * 21
+
+
+@pytest.mark.parametrize("questions", [1, 2, 3, 20, 30, 31, 32, 33, 50, 61, 62, 95, 200])
+def test_a_stop_in_the_midst_of_a_generation_keeps_the_best(monkeypatch, questions):
+    monkeypatch.setattr("app.solvers.genetic.CHUNK_GENES", 1)
+    problem = generate("uniform", 5, 10, 3, np.random.default_rng(1))
+    whole = solve(problem, iteration=20).history.reward
+    stop = After(questions)
+    stopped = solve(problem, stop=stop, iteration=20)
+    rewards = stopped.history.reward
+
+    assert stop.asked == questions
+    assert rewards == sorted(rewards)
+    assert rewards[:-1] == whole[: len(rewards) - 1]
+    assert 0.0 <= rewards[-1] <= whole[len(rewards) - 1]
+    assert rewards[-1] == pytest.approx(reward_of(problem, stopped.plan), abs=1e-12)
