@@ -20,7 +20,8 @@ from app.simulation.explain import explain
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
 
-_VERIFY = ("app.learning.checkpoint", "verify")
+_VERIFY = "app.learning.checkpoint:verify"
+_WARM_UP_TRANSFER = "app.learning.universal.warm_up:warm_up"
 
 # What follows the search: explaining the plan, 3 µs a pair of UAV and target (measured at 100x300), storing
 # the result and answering. Of a short time limit the search keeps most.
@@ -31,6 +32,7 @@ _LARGEST_ANSWER_SHARE = 0.25
 _WARM_UP_PARAMETERS: dict[str, dict[str, Any]] = {
     "greedy": {},
     "ga": {"num_total": 4, "iteration": 2},
+    "local_search": {"moves": 200},
     "qmix": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
 }
 
@@ -136,6 +138,7 @@ def warm_up() -> None:
         work = allocate({**payload, "algorithm": algorithm, "parameters": parameters}, context)
         if work.artifact is not None:
             _verify(work.artifact, problem)
+    _named(_WARM_UP_TRANSFER)(problem)
 
 
 def _answer(allocation: Allocation) -> dict[str, Any]:
@@ -174,6 +177,11 @@ def _report(context: WorkContext) -> Callable[[protocol.Progress], None]:
 
 
 def _verify(checkpoint: bytes, task: Problem) -> None:
-    """Check a checkpoint; by name, like the algorithms, so that this room does not depend on the learners."""
-    module, name = _VERIFY
-    getattr(import_module(module), name)(checkpoint, task)
+    _named(_VERIFY)(checkpoint, task)
+
+
+def _named(dotted: str) -> Callable[..., Any]:
+    """Find a function by name, like the algorithms, so that this room does not depend on the learners."""
+    module, _, name = dotted.partition(":")
+    found: Callable[..., Any] = getattr(import_module(module), name)
+    return found

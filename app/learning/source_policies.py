@@ -16,7 +16,7 @@ import numpy as np
 from app.domain.errors import InvalidParameters, NoCompatibleSource, Violation
 from app.domain.problem import Problem
 from app.learning.architecture import QMIX_PAPER_1, QmixConfig
-from app.learning.checkpoint import Checkpoint, decode
+from app.learning.checkpoint import Network, decode
 from app.learning.universal.architecture import QMIX_UNIVERSAL_1
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
@@ -39,10 +39,10 @@ _KEPT = 16
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A policy of the library, and what it holds. The networks are shared: copy them before training."""
+    """A policy of the library with its networks, which are shared: copy them before training."""
 
     policy: SourcePolicy
-    checkpoint: Checkpoint
+    network: Network
 
 
 class SourcePolicies:
@@ -65,15 +65,13 @@ class SourcePolicies:
         NoCompatibleSource
             If there is none; ``details["sizes"]`` has the sizes there are.
         """
-        library = self._library
-        if library is None:
-            raise _no_source(problem, "there is no library", [])
+        library = self._required(problem)
         space, description = description_space(problem), task_description(problem)
         asked, neighbours = 1, library.nearest(space, description, 1, QMIX_PAPER_1)
         while True:
             for neighbour in neighbours:
                 if neighbour.policy.metadata.get("config") == config.as_record():
-                    return self._source(neighbour.policy, neighbour.distance)
+                    return _source(library, neighbour.policy, neighbour.distance)
             if len(neighbours) < asked:
                 break
             # The nearest have other hidden units, which only requests that change the defaults meet.
@@ -94,9 +92,7 @@ class SourcePolicies:
         NoCompatibleSource
             If there is none; ``details["sizes"]`` has the sizes of the other policies.
         """
-        library = self._library
-        if library is None:
-            raise _no_source(problem, "there is no library", [])
+        library = self._required(problem)
         near = library.nearest(SUMMARY_SPACE, task_summary(problem), _LOOKED_THROUGH, QMIX_UNIVERSAL_1)
         if not near:
             reason = f"the library has no policy of architecture {QMIX_UNIVERSAL_1}, which fits every size"
@@ -104,7 +100,7 @@ class SourcePolicies:
         # Among equals the nearest stays: of the same key a dictionary keeps the last.
         once = {neighbour.policy.checkpoint_sha256: neighbour for neighbour in reversed(near)}
         nearest = sorted(once.values(), key=near.index)[:SHORTLIST]
-        return [self._source(neighbour.policy, neighbour.distance) for neighbour in nearest]
+        return [_source(library, neighbour.policy, neighbour.distance) for neighbour in nearest]
 
     def asked_for(self, policy_id: str, problem: Problem, *, config: QmixConfig, any_size: bool) -> Source:
         """Return the policy that a request names.
@@ -118,21 +114,26 @@ class SourcePolicies:
         config
             Shape of the networks of a policy for one size.
         any_size
-            Whether a policy for every size may be asked for too.
+            Whether a policy for every size may be asked for too; its distance is that of the summaries.
 
         Raises
         ------
         InvalidParameters
             If there is no such policy, or it does not fit.
+        NoCompatibleSource
+            If there is no library.
         """
+        library = self._required(problem)
         try:
-            if self._library is None:
-                raise PolicyNotFound(policy_id)
-            policy, vectors = self._library.get(policy_id), self._library.vectors(policy_id)
+            policy, vectors = library.get(policy_id), library.vectors(policy_id)
         except PolicyNotFound:
             raise _bad_source(f"there is no policy {policy_id!r} in the library") from None
-        if any_size and policy.architecture == QMIX_UNIVERSAL_1:
-            return self._source(policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
+        if policy.architecture == QMIX_UNIVERSAL_1:
+            if not any_size:
+                raise _bad_source(
+                    f"policy {policy_id!r} is for every size; paper mode copies one for one size"
+                )
+            return _source(library, policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
         space = description_space(problem)
         fits = policy.architecture == QMIX_PAPER_1 and policy.metadata.get("config") == config.as_record()
         if not fits or space not in vectors:
@@ -140,23 +141,28 @@ class SourcePolicies:
                 f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "
                 f"{_size(problem)} with {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
             )
-        if any_size:
-            return self._source(policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
-        return self._source(policy, _distance(vectors[space], task_description(problem)))
+        return _source(library, policy, _distance(vectors[space], task_description(problem)))
 
-    def _source(self, policy: Policy, distance: float) -> Source:
-        checkpoint = _decoded.get(policy.checkpoint_sha256)
-        if checkpoint is None:
-            assert self._library is not None
-            checkpoint = decode(self._library.checkpoint(policy.id))
-            _decoded[policy.checkpoint_sha256] = checkpoint
-            if len(_decoded) > _KEPT:
-                _decoded.popitem(last=False)
-        _decoded.move_to_end(policy.checkpoint_sha256)
-        return Source(SourcePolicy(policy.id, policy.name, distance), checkpoint)
+    def _required(self, problem: Problem) -> PolicyLibrary:
+        if self._library is None:
+            raise _no_source(problem, "there is no library", [])
+        return self._library
 
 
-_decoded: OrderedDict[str, Checkpoint] = OrderedDict()
+def _source(library: PolicyLibrary, policy: Policy, distance: float) -> Source:
+    sha256 = policy.checkpoint_sha256
+    network = _decoded.get(sha256)
+    if network is None:
+        network = decode(library.checkpoint(policy.id)).network
+        _decoded[sha256] = network
+        if len(_decoded) > _KEPT:
+            _decoded.popitem(last=False)
+    _decoded.move_to_end(sha256)
+    return Source(SourcePolicy(policy.id, policy.name, distance), network)
+
+
+_decoded: OrderedDict[str, Network] = OrderedDict()
+"""Networks by the SHA-256 of their checkpoint, the one used last at the end."""
 
 
 @lru_cache(maxsize=4)

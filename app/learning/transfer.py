@@ -75,7 +75,7 @@ class TransferQmix:
                 sources = policies.shortlist(problem)
             else:
                 sources = [policies.asked_for(parameters.source, problem, config=config, any_size=True)]
-            if isinstance(sources[0].checkpoint.network, UniversalPolicy):
+            if isinstance(sources[0].network, UniversalPolicy):
                 return UniversalTransfer(problem, parameters, seed, stop, report).run(sources)
             return _fine_tune_and_polish(problem, sources[0], parameters, seed, stop, report)
 
@@ -92,7 +92,7 @@ def _fine_tune(
     used = parameters.table_3()
     config = qmix_config(problem, used)
     require_memory(used, config.sizes, problem.max_steps, used.drqn_hidden_dim)
-    network = copy.deepcopy(cast(QmixNetwork, source.checkpoint.network))
+    network = copy.deepcopy(cast(QmixNetwork, source.network))
     training = train(problem, network, used, random_streams(seed), stop, report, count_updates=True)
     parameters = parameters.model_copy(update={"n_epochs": used.n_epochs})
     learned = encode(

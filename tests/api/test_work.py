@@ -16,7 +16,14 @@ from app.domain.problem import Objective, Problem
 from app.domain.records import problem_from_record, problem_to_record
 from app.jobs import work
 from app.jobs.work_context import CANCEL, WorkContext, new_control
+from app.learning.checkpoint import encode
+from app.learning.parameters import QmixParameters
+from app.learning.universal.architecture import UniversalConfig
+from app.learning.universal.policy import UniversalPolicy
+from app.library.entries import new_policy
 from app.settings import Settings
+from policy_store.database import Database
+from policy_store.library import PolicyLibrary
 
 ROOT = Path(__file__).parents[2]
 QMIX = {"n_epochs": 50, "buffer_size": 4, "batch_size": 4, "evaluate_per_epoch": 5}
@@ -53,7 +60,7 @@ def test_result_is_json_and_progress_ends_at_its_plan():
     assert done.result["reward"] >= best[-1] - 1e-12
 
 
-@pytest.mark.parametrize(("algorithm", "parameters"), [("greedy", {}), ("ga", {}), ("qmix", QMIX)])
+@pytest.mark.parametrize(("algorithm", "parameters"), [("greedy", {}), ("ga", {}), ("qmix", QMIX), ("local_search", {})])
 def test_stopped_before_it_began_there_is_still_a_plan(algorithm, parameters):
     control = new_control()
     control[CANCEL] = 1.0
@@ -86,7 +93,29 @@ def test_training_is_registered_by_its_checkpoint():
         work.register({"name": "x", "problem": record("cyclone-idai"), "checkpoint_base64": text}, context)
 
 
-def test_nothing_is_compiled_after_the_warm_up():
+@pytest.fixture
+def library_url(tmp_path):
+    """A library with a policy for every size."""
+    config = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+    task = problem_from_record(record())
+    checkpoint = encode(
+        UniversalPolicy.of_seed(config, 1),
+        config=config,
+        task=task,
+        algorithm="qmix",
+        seed=1,
+        parameters=QmixParameters(),
+        metrics={},
+    )
+    database = Database(f"sqlite:///{tmp_path / 'library.sqlite3'}")
+    library = PolicyLibrary(database)
+    library.migrate()
+    library.add(new_policy("every size", task, checkpoint))
+    database.dispose()
+    return database.url
+
+
+def test_nothing_is_compiled_after_the_warm_up(library_url):
     program = """
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
@@ -110,8 +139,16 @@ print(json.dumps([before, compiled()]))
     payloads = [
         payload(algorithm, parameters, each)
         for each in (record(), record("cyclone-idai"), problem_to_record(changed))
-        for algorithm, parameters in (("greedy", {}), ("ga", {"iteration": 3}), ("qmix", QMIX))
+        for algorithm, parameters in (
+            ("greedy", {}),
+            ("ga", {"iteration": 3}),
+            ("qmix", QMIX),
+            ("local_search", {"moves": 5000}),
+            ("transfer_qmix", {"samples": 3, "n_epochs": 1, "polish_moves": 5000}),
+        )
     ]
+    for each in payloads:
+        each["library_url"] = library_url
 
     done = subprocess.run(
         [sys.executable, "-c", program],

@@ -14,6 +14,7 @@ from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.learner import evaluate, joint_values, make_batch
 from app.learning.universal.mixer import UniversalMixer
 from app.learning.universal.network import UniversalAgent
+from app.learning.universal.trainer import initial
 from app.learning.universal.unfolding import unfold
 from app.simulation.arrays import compile_problem
 from app.solvers.greedy import greedy_plan
@@ -36,6 +37,13 @@ class UniversalPolicy(nn.Module):
         self.config = config
         self.agent = UniversalAgent(config.width, config.layers)
         self.mixer = UniversalMixer(config.width, config.qmix_hidden_dim)
+
+    @classmethod
+    def of_seed(cls, config: UniversalConfig, seed: int) -> UniversalPolicy:
+        """Make a policy with random weights that depend on the seed alone."""
+        policy = cls(config)
+        policy.agent, policy.mixer = initial(config, seed)
+        return policy
 
     @classmethod
     def of_training(cls, state: Path, config: UniversalConfig) -> UniversalPolicy:

@@ -91,7 +91,7 @@ class UniversalTransfer:
             source, reward = self._roll_out(sources)
             self._history.add(0, reward)
             self._tell("roll-out", 1.0)
-            policy = cast(UniversalPolicy, source.checkpoint.network)
+            policy = cast(UniversalPolicy, source.network)
             self._sample(policy)
             checkpoint = self._fine_tune(policy)
         else:
@@ -111,7 +111,7 @@ class UniversalTransfer:
         """Play each policy greedily; return the best, among equals the nearest, and what it earned."""
         found: list[tuple[Source, float]] = []
         for source in sources:
-            policy = cast(UniversalPolicy, source.checkpoint.network)
+            policy = cast(UniversalPolicy, source.network)
             played = play(policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
             self._best.consider(played.plans)
             found.append((source, float(played.rewards[0])))
