@@ -3,8 +3,8 @@
 The paper compares tasks number by number (:mod:`app.library.description`), so only tasks of the same M, N and
 K can be compared, and the same task with its UAVs in another order is another task. A summary is a row of 28
 numbers that depends neither on sizes being equal, nor on the order of UAVs, targets or materials, nor on
-units, nor on where on the map the task lies. Every number is a logarithm, a share or a ratio bounded by 1, so
-that none decides alone; tasks are as far from each other as the sum of squared differences says.
+units, nor on where on the map the task lies. Every number is a share, a ratio bounded by 1 or a logarithm of a
+size, so that none decides alone; tasks are as far apart as the sum of squared differences says.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
         "level_dispersion": _dispersion(level),
         "base_spread": _mean_distance(problem, start) / extent,
         "target_spread": float(apart.mean()) / extent,
-        "target_clustering": _nearest_neighbour(apart) * math.sqrt(len(apart)) / extent,
+        "target_clustering": min(_nearest_neighbour(apart) * math.sqrt(len(apart)) / extent, 1.0),
         "target_elongation": _elongation(problem, area),
         "base_to_target": float(to_target.mean()) / extent,
         "range": _against(left.mean(), extent),

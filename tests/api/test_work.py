@@ -60,7 +60,9 @@ def test_result_is_json_and_progress_ends_at_its_plan():
     assert done.result["reward"] >= best[-1] - 1e-12
 
 
-@pytest.mark.parametrize(("algorithm", "parameters"), [("greedy", {}), ("ga", {}), ("qmix", QMIX), ("local_search", {})])
+@pytest.mark.parametrize(
+    ("algorithm", "parameters"), [("greedy", {}), ("ga", {}), ("qmix", QMIX), ("local_search", {})]
+)
 def test_stopped_before_it_began_there_is_still_a_plan(algorithm, parameters):
     control = new_control()
     control[CANCEL] = 1.0

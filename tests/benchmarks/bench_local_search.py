@@ -1,6 +1,7 @@
 """Speed of the local search from 5 x 10 to 1000 x 2000: what a move costs, and what a second of moves brings.
 
-Run: ``python tests/benchmarks/bench_local_search.py``. Processor time of one thread, K = 3, S = 5, family ``uniform``.
+Run: ``python tests/benchmarks/bench_local_search.py``. Processor time of one thread;
+K = 3, S = 5, family ``uniform``.
 """
 
 from __future__ import annotations

@@ -23,6 +23,25 @@ MAX_BYTES = 2**30
 """Most memory that an update may take; workers share a machine."""
 
 
+def require_memory(arrays: ProblemArrays) -> None:
+    """Refuse a problem on which a policy could not be fine-tuned.
+
+    Raises
+    ------
+    ProblemTooLarge
+        If an update on one episode would take more than :data:`MAX_BYTES`.
+    """
+    m, n, _ = arrays.shape
+    steps = int(arrays.max_steps[0])
+    # Biases and weights of attention a pair of tokens, activations a token and a rival.
+    needed = m * steps * (300 * (n + 1) ** 2 + 10_000 * n + 700 * n * m)
+    if needed > MAX_BYTES:
+        raise ProblemTooLarge(
+            f"fine-tuning on {m} UAVs and {n} targets over {steps} steps takes {needed / 2**20:.0f} MiB; "
+            f"the limit is {MAX_BYTES / 2**20:.0f} MiB"
+        )
+
+
 class FineTuning:
     """Fits a copy of a policy to a problem, epoch by epoch.
 
@@ -38,11 +57,6 @@ class FineTuning:
         Learning rate of Adam, discount.
     rng
         Source of the episodes.
-
-    Raises
-    ------
-    ProblemTooLarge
-        If an update on one episode would not fit into memory.
     """
 
     def __init__(
@@ -58,15 +72,7 @@ class FineTuning:
         self.policy = copy.deepcopy(policy)
         self._arrays, self._rng = arrays, rng
         m, n, _ = arrays.shape
-        turns = m * int(arrays.max_steps[0])
-        # Biases and weights of attention a pair of tokens, activations a token and a rival.
-        needed = turns * (300 * (n + 1) ** 2 + 10_000 * n + 700 * n * m)
-        if needed > MAX_BYTES:
-            raise ProblemTooLarge(
-                f"fine-tuning on {m} UAVs and {n} targets over {int(arrays.max_steps[0])} steps takes "
-                f"{needed / 2**20:.0f} MiB; the limit is {MAX_BYTES / 2**20:.0f} MiB"
-            )
-        tokens = turns * (n + 1)
+        tokens = m * int(arrays.max_steps[0]) * (n + 1)
         self._episodes = batch_of(arrays, max(1, min(batch_size, _TURN_TOKENS // tokens)))
         self._learner = Learner(self.policy.agent, self.policy.mixer, lr=lr, td_weight=0.2, gamma=gamma)
 

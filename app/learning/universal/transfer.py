@@ -18,7 +18,7 @@ from app.learning.parameters import TransferQmixParameters
 from app.learning.source_policies import Source
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.effort import Effort, batch_of, effort
-from app.learning.universal.fine_tuning import FineTuning
+from app.learning.universal.fine_tuning import FineTuning, require_memory
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
 from app.learning.universal.rollout import play
@@ -78,8 +78,16 @@ class UniversalTransfer:
         self._sampling, self._tuning, self._polishing = map(np.random.default_rng, root.spawn(3))
 
     def run(self, sources: Sequence[Source]) -> Solution:
-        """Solve it from the best of some policies for every size, nearest first."""
+        """Solve it from the best of some policies for every size, nearest first.
+
+        Raises
+        ------
+        ProblemTooLarge
+            If fine-tuning is asked for and would not fit into memory.
+        """
         used, checkpoint = self._used, None
+        if used.n_epochs:
+            require_memory(self._arrays)
         if new_episodes(self._arrays, 1).done[0]:
             # Nobody can fly anywhere: every policy would stay at home.
             self._history.add(0, self._best.reward)

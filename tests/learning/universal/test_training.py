@@ -1,0 +1,131 @@
+"""Demonstrations and the training loop: reproducible from seeds, resumable at any update."""
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+import torch
+from referee import replay
+
+from app.domain.records import problem_to_record
+from app.learning.universal import trainer
+from app.learning.universal.architecture import UniversalConfig
+from app.learning.universal.curriculum import SHAPES, Shard, draw_shard
+from app.learning.universal.demonstrations import demonstrate, read_shard, write_shard
+from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.trainer import Schedule, fit, initial
+from app.simulation.generator import generate
+from app.solvers.greedy import greedy_plan
+
+SMALL = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory):
+    """Two small files of demonstrations."""
+    folder = tmp_path_factory.mktemp("shards")
+    paths = []
+    for number in range(2):
+        rng = np.random.default_rng(number)
+        problems = [generate("uniform", 3, 5, 2, rng) for _ in range(5)]
+        shown = demonstrate(Shard(3, 5, problems, moves=2000), rng)
+        path = folder / f"{number}.npz"
+        np.savez(path, plans=shown.plans, rewards=shown.rewards, **shown.arrays._asdict())
+        paths.append(path)
+    return paths
+
+
+def train(shards, state, updates):
+    """Train up to an update of a schedule of 40; stopped as a machine that goes down stops it."""
+
+    class Down(Exception):
+        pass
+
+    def watch(update, _means):
+        if update == updates and updates < 40:
+            raise Down
+
+    agent, mixer = initial(SMALL, 3)
+    with suppress(Down):
+        fit(agent, mixer, shards, Schedule(40, seed=5), state, watch)
+    return agent, mixer
+
+
+def test_training_resumes_to_the_same_weights(shards, tmp_path, monkeypatch):
+    monkeypatch.setattr(trainer, "SAVE_EVERY", 10)
+    agent, mixer = train(shards, tmp_path / "whole.safetensors", 40)
+    for stopped in (7, 23, 36):
+        train(shards, tmp_path / "pieces.safetensors", stopped)
+    again, again_mixer = train(shards, tmp_path / "pieces.safetensors", 40)
+    for one, two in ((agent, again), (mixer, again_mixer)):
+        for a, b in zip(one.parameters(), two.parameters(), strict=True):
+            assert torch.equal(a, b)
+    policy = UniversalPolicy.of_training(tmp_path / "whole.safetensors", SMALL)
+    assert all(torch.equal(a, b) for a, b in zip(policy.agent.parameters(), agent.parameters(), strict=True))
+
+
+def test_training_changes_the_policy_and_lowers_the_losses(shards, tmp_path):
+    told = []
+    agent, mixer = initial(SMALL, 3)
+    start = [p.clone() for p in agent.parameters()]
+    fit(
+        agent,
+        mixer,
+        shards,
+        Schedule(60, lr=2e-2, seed=5),
+        tmp_path / "s",
+        lambda n, means: told.append(dict(means)),
+    )
+    assert len(told) == 60
+    assert told[-1]["imitation"] < 0.9 * told[0]["imitation"]
+    assert not any(torch.equal(a, b) for a, b in zip(agent.parameters(), start, strict=True))
+
+
+def test_learning_rate_rises_and_falls():
+    schedule = Schedule(6000)
+    shares = [schedule.share_of_lr(update) for update in range(6000)]
+    assert shares[0] < 0.01
+    assert max(shares) > 0.99
+    assert shares.index(max(shares)) == 199
+    assert shares[-1] < 1e-4
+
+
+def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "app.learning.universal.demonstrations.draw_shard",
+        lambda rng: Shard(2, 4, [generate("uniform", 2, 4, 2, rng) for _ in range(3)], moves=500),
+    )
+    first, second = tmp_path / "a", tmp_path / "b"
+    for folder in (first, second):
+        folder.mkdir()
+    one, two = (read_shard(write_shard(folder, 7, 1)) for folder in (first, second))
+    assert np.array_equal(one.plans, two.plans)
+    assert all(np.array_equal(a, b) for a, b in zip(one.arrays, two.arrays, strict=True))
+    other = read_shard(write_shard(first, 7, 2))
+    assert not np.array_equal(one.arrays.load, other.arrays.load)
+    path = write_shard(first, 7, 1)
+    written = path.stat().st_mtime_ns
+    assert write_shard(first, 7, 1).stat().st_mtime_ns == written
+
+
+def test_drawn_shards_have_the_listed_shapes():
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        shard = draw_shard(rng)
+        assert (shard.n_uavs, shard.n_targets) in [(m, n) for m, n, _ in SHAPES]
+        assert {(p.n_uavs, p.n_targets) for p in shard.problems} == {(shard.n_uavs, shard.n_targets)}
+        assert all(1 <= p.max_steps <= 7 for p in shard.problems)
+
+
+def test_demonstrations_are_legal_and_better_than_greedy():
+    rng = np.random.default_rng(10)
+    problems = [generate("single_base", 5, 8, 2, rng) for _ in range(4)]
+    shown = demonstrate(Shard(5, 8, problems, moves=20_000), rng)
+    gained = 0.0
+    for problem, plan, reward in zip(problems, shown.plans, shown.rewards, strict=True):
+        record = problem_to_record(problem)
+        assert replay(record, plan[: problem.max_steps].tolist())["reward"] == pytest.approx(reward)
+        greedy = replay(record, greedy_plan(problem).as_array().tolist())["reward"]
+        assert reward >= greedy - 1e-9
+        gained += reward - greedy
+    assert gained > 0.1
