@@ -3,7 +3,7 @@
 The paper compares tasks number by number (:mod:`app.library.description`), so only tasks of the same M, N and
 K can be compared, and the same task with its UAVs in another order is another task. A summary is a row of 28
 numbers that depends neither on sizes being equal, nor on the order of UAVs, targets or materials, nor on
-units, nor on where on the map the task lies. Every number is a share, a ratio bounded by 1 or a logarithm of a
+units, nor on where on the map the task lies. Every number is a share, a bounded ratio or a logarithm of a
 size, so that none decides alone; tasks are as far apart as the sum of squared differences says.
 """
 
