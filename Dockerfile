@@ -1,10 +1,11 @@
-# The service in one image. PyTorch's default wheel for Linux carries gigabytes of CUDA libraries; the index of
-# CPU wheels is the default here and can be replaced, e.g. by a company's mirror:
-#   docker build --build-arg TORCH_INDEX=https://download.pytorch.org/whl/cpu -t uav-allocator .
+# The service in one image. PyTorch's default wheel for Linux carries gigabytes of CUDA libraries that nothing here
+# needs: give the address of PyTorch's index of CPU wheels (its installation page has it), or of a mirror.
+#   docker build --build-arg TORCH_INDEX=ADDRESS -t uav-allocator .
+#   docker run --rm -v allocator-data:/data uav-allocator python -m app keys create --role library --name me
 #   docker run --rm -p 8000:8000 -v allocator-data:/data uav-allocator
 FROM python:3.11-slim
 
-ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
+ARG TORCH_INDEX=
 
 ENV PIP_NO_CACHE_DIR=1 \
     PIP_DISABLE_PIP_VERSION_CHECK=1 \
@@ -18,7 +19,7 @@ WORKDIR /srv/allocator
 COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY app ./app
 COPY policy_store ./policy_store
-RUN pip install --index-url "$TORCH_INDEX" "$(grep '^torch==' constraints.txt)" \
+RUN pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "$(grep '^torch==' constraints.txt)" \
     && pip install --constraint constraints.txt .
 
 # The compiled code is made here, as the user that runs it, so that no first answer waits for a compiler.

@@ -27,6 +27,7 @@ unit: .venv/installed
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_simulator.py
 	$(BIN)/python tests/benchmarks/bench_training.py
+	$(BIN)/python tests/benchmarks/bench_local_search.py
 
 # Pins everything, from a clean environment: run it after a change of the dependencies.
 constraints:

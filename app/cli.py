@@ -159,6 +159,31 @@ def train(
         typer.echo(f"{added} of {len(tasks)} policies are new in the library", err=True)
 
 
+@application.command()
+def train_universal(
+    file: Annotated[Path, typer.Option(help="The checkpoint; its stem becomes the policy's id.")],
+    work: Annotated[Path, typer.Option(help="Folder for demonstrations and the state of the training.")],
+    shards: Annotated[int, typer.Option(min=1, help="Files of demonstrations.")] = 400,
+    updates: Annotated[int, typer.Option(min=1, help="Steps of the optimiser.")] = 6000,
+    workers: Annotated[int, typer.Option(min=1, help="Processes, then threads.")] = os.cpu_count() or 1,
+) -> None:
+    """Train one policy for every number of UAVs, areas and materials.
+
+    Near-optimal plans of generated problems are searched first, then a network learns from them and from its
+    own episodes. A run that was interrupted goes on where it stopped.
+    """
+    # Loads torch, which the other commands need not wait for.
+    from app.learning.universal import production  # noqa: PLC0415
+
+    parameters = production.UniversalTrainingParameters(shards=shards, updates=updates)
+    with _bar("universal policy", total=1.0) as advance:
+
+        def tell(stage: str, share: float, said: str) -> None:
+            advance(share, f"{stage} {said}")
+
+        production.train_universal(file, work, parameters, workers, tell)
+
+
 @keys.command("create")
 def create_key(
     role: Annotated[Role, typer.Option(help="allocate; or library: policies may be changed too.")],

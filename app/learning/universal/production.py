@@ -31,9 +31,6 @@ Tell = Callable[[str, float, str], None]
 METRIC_SHAPE = (10, 20, 3)
 """M, N and K of the fresh problems on which a policy is measured, and of the task it is filed under."""
 
-METRIC_PROBLEMS = 16
-"""Fresh problems a family."""
-
 METRIC_MOVES = 400_000
 """Moves of the search whose plans the policy's are compared with."""
 
@@ -51,6 +48,7 @@ class UniversalTrainingParameters(Parameters):
     width: int = Field(default=64, ge=4, multiple_of=4, description="Width of a token")
     layers: int = Field(default=2, ge=1, description="Attention layers")
     qmix_hidden_dim: int = Field(default=32, ge=1, description="Hidden units of the mixing network")
+    metric_problems: int = Field(default=16, ge=1, description="Fresh problems a family to measure it on")
     seed: int = Field(default=123, ge=0, description="Source of all randomness")
 
     @property
@@ -118,7 +116,7 @@ def write_policy(
     """
     metrics: dict[str, float | int] = {"updates": parameters.updates}
     for number, family in enumerate(FAMILIES):
-        metrics[f"greedy_ratio_{family}"] = round(greedy_ratio(policy, family), 4)
+        metrics[f"greedy_ratio_{family}"] = round(greedy_ratio(policy, family, parameters.metric_problems), 4)
         tell("metrics", (number + 1) / len(FAMILIES), family)
     data = encode(
         policy,
@@ -137,10 +135,10 @@ def write_policy(
     os.replace(partial, file)
 
 
-def greedy_ratio(policy: UniversalPolicy, family: str) -> float:
+def greedy_ratio(policy: UniversalPolicy, family: str, count: int) -> float:
     """Mean share of a searched plan's reward that greedy roll-outs earn on fresh problems of a family."""
     rng = np.random.default_rng([_FRESH, *family.encode()])
-    problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(METRIC_PROBLEMS)]
+    problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(count)]
     m, n, _ = METRIC_SHAPE
     shown = demonstrate(Shard(m, n, problems, METRIC_MOVES), rng)
     played = play(policy.agent, shown.arrays, np.arange(len(shown.rewards)))
