@@ -9,6 +9,10 @@ from referee import replay
 
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
+from app.learning.checkpoint import encode
+from app.learning.parameters import QmixParameters
+from app.learning.universal.architecture import UniversalConfig
+from app.learning.universal.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.simulation.explain import reward_of
 from app.simulation.generator import generate
@@ -18,8 +22,10 @@ from app.solvers.stop import never
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
 
+SERVICE = "transfer_qmix in service mode"
 LEARNING = {"n_epochs": 12, "evaluate_per_epoch": 3, "buffer_size": 4, "batch_size": 4}
 QUICK = {
+    SERVICE: {"mode": "service", "samples": 3, "n_epochs": 2, "polish": True, "polish_moves": 1000},
     "transfer_qmix": {**LEARNING, "mode": "paper"},
     "qmix": {**LEARNING, "mode": "paper"},
     "dqn": LEARNING,
@@ -45,7 +51,7 @@ PROBLEMS = problems()
 
 @pytest.fixture(scope="module")
 def context(tmp_path_factory):
-    """A library with one source policy for each of the shapes."""
+    """A library with one source policy for each of the shapes, and one for every size."""
     url = f"sqlite:///{tmp_path_factory.mktemp('library') / 'library.sqlite3'}"
     database = Database(url)
     library = PolicyLibrary(database)
@@ -54,16 +60,36 @@ def context(tmp_path_factory):
         task = generate("uniform", *shape, np.random.default_rng(1))
         solution = solve("qmix", task, SolverContext())
         library.add(new_policy("source", task, solution.checkpoint))
+    library.add(new_policy("every size", task, for_every_size(task)))
     database.dispose()
     return SolverContext(url)
 
 
+def for_every_size(task):
+    """A checkpoint of random weights."""
+    config = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+    return encode(
+        UniversalPolicy.of_seed(config, 1),
+        config=config,
+        task=task,
+        algorithm="qmix",
+        seed=1,
+        parameters=QmixParameters(),
+        metrics={},
+    )
+
+
+def quick(name):
+    """Parameters with which an algorithm is quick, and its name in the registry."""
+    algorithm = "transfer_qmix" if name == SERVICE else name
+    return algorithm, parse_parameters(algorithm, QUICK.get(name, {}))
+
+
 def solve(name, problem, context, stop=never, report=lambda progress: None, seed=7):
-    solver = create_solver(name, parse_parameters(name, QUICK.get(name, {})), context)
-    return solver.solve(problem, seed, stop, report)
+    return create_solver(*quick(name), context).solve(problem, seed, stop, report)
 
 
-every_algorithm = pytest.mark.parametrize("name", ALGORITHMS)
+every_algorithm = pytest.mark.parametrize("name", [*ALGORITHMS, SERVICE])
 
 
 @every_algorithm
@@ -115,5 +141,4 @@ def test_where_nothing_can_be_done_everybody_stays_at_home(name, context, change
 
 @every_algorithm
 def test_the_parameters_that_were_used_come_back(name, context):
-    given = parse_parameters(name, QUICK.get(name, {}))
-    assert solve(name, PROBLEMS[0], context).parameters == given
+    assert solve(name, PROBLEMS[0], context).parameters == quick(name)[1]

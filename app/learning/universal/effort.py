@@ -9,14 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.simulation.arrays import ProblemArrays
+from app.solvers.local_search.effort import default_moves
 
 _MOST_WORK = 6e7
 """Work of a greedy roll-out that is done without being asked for; some seconds."""
 
-_SAMPLING_WORK = 1.6e7
-"""Work of all sampled roll-outs together; about a second."""
+_SAMPLING_WORK = 6e6
+"""Work of all sampled roll-outs together; about a third of a second."""
 
 _SAMPLES = 64
+
+_TUNING_WORK = 3e5
+"""Work of a greedy roll-out up to which the policy is fine-tuned; an epoch takes tenths of a second there."""
+
+_EPOCHS = 2
+"""Within two seconds the search brings more than further epochs; these leave a policy to register."""
+
+_POLISH_SHARE = 0.7
+"""Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +53,8 @@ def effort(arrays: ProblemArrays) -> Effort:
     return Effort(
         policy=work <= _MOST_WORK,
         samples=int(min(_SAMPLES, _SAMPLING_WORK / work)),
-        n_epochs=0,
-        polish_moves=1_000_000,
+        n_epochs=_EPOCHS if work <= _TUNING_WORK else 0,
+        polish_moves=round(_POLISH_SHARE * default_moves(arrays)),
     )
 
 

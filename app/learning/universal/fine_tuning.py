@@ -16,7 +16,7 @@ from app.learning.universal.unfolding import unfold
 from app.simulation.arrays import Integers, ProblemArrays, stack
 from app.solvers.protocol import StopCriterion
 
-_TURN_TOKENS = 8000
+_TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
 
 MAX_BYTES = 2**30
