@@ -149,6 +149,8 @@ print(json.dumps([before, compiled()]))
             ("transfer_qmix", {"samples": 3, "n_epochs": 1, "polish_moves": 5000}),
         )
     ]
+    few = Problem(problem.uavs[:2], problem.targets[:4])
+    payloads.append(payload("dqn", QMIX, problem_to_record(few)))
     for each in payloads:
         each["library_url"] = library_url
 
