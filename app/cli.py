@@ -116,7 +116,7 @@ def allocate(
         with _library(settings) as (library, database):
             seed_library(library, database)
         # Loads compiled code and torch, which a call for help or a mistake need not wait for.
-        from app.jobs import work  # noqa: PLC0415
+        from app.jobs import work  # noqa: PLC0415 - slow to load
 
         with _bar(request.algorithm, total=1.0) as advance:
 
@@ -143,7 +143,7 @@ def train(
     A run that was interrupted goes on where it stopped.
     """
     # Loads torch, which the other commands need not wait for.
-    from app.learning.train_library import source_tasks, train_library  # noqa: PLC0415
+    from app.learning.train_library import source_tasks, train_library  # noqa: PLC0415 - slow to load
 
     settings = _settings(data_dir=data_dir)
     target = folder or settings.data_dir / "training"
@@ -173,7 +173,7 @@ def train_universal(
     own episodes. A run that was interrupted goes on where it stopped.
     """
     # Loads torch, which the other commands need not wait for.
-    from app.learning.universal import production  # noqa: PLC0415
+    from app.learning.universal import production  # noqa: PLC0415 - slow to load
 
     parameters = production.UniversalTrainingParameters(shards=shards, updates=updates)
     with _bar("universal policy", total=1.0) as advance:

@@ -44,7 +44,7 @@ class JointNetwork(nn.Module):
         self,
         states: Tensor,
         last_actions: Tensor | None,  # noqa: ARG002 - the state is all it needs
-        hidden: Tensor | None,  # noqa: ARG002
+        hidden: Tensor | None,  # noqa: ARG002 - the state is all it needs
     ) -> tuple[Tensor, None]:
         """Q values (B, 1, A) of the states (B, D)."""
         return self.unroll(states.unsqueeze(0), states)[0], None
