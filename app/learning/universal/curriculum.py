@@ -11,7 +11,8 @@ from app.domain.problem import Objective, Problem
 from app.simulation.generator import FAMILIES, generate
 
 SHAPES: tuple[tuple[int, int, float], ...] = (
-    (3, 6, 0.05),
+    (3, 3, 0.02),
+    (3, 6, 0.04),
     (5, 10, 0.12),
     (10, 10, 0.10),
     (10, 5, 0.08),
@@ -23,7 +24,9 @@ SHAPES: tuple[tuple[int, int, float], ...] = (
     (15, 20, 0.07),
     (20, 20, 0.06),
     (20, 30, 0.04),
-    (30, 60, 0.03),
+    (30, 60, 0.02),
+    (50, 100, 0.01),
+    (100, 300, 0.01),
 )
 """M, N and how often."""
 
@@ -69,7 +72,7 @@ def draw_shard(rng: np.random.Generator, families: Sequence[str] = tuple(FAMILIE
         k = 3 if rng.random() < 0.6 else int(rng.integers(1, 7))
         problem = generate(str(rng.choice(families)), m, n, k, rng)
         problems.append(vary(problem, rng))
-    return Shard(m, n, problems, moves=int(np.clip(1000 * m * n, 60_000, 400_000)))
+    return Shard(m, n, problems, moves=int(np.clip(1000 * m * n, 100_000, 3_000_000)))
 
 
 def vary(problem: Problem, rng: np.random.Generator) -> Problem:
