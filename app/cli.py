@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,7 +35,7 @@ from app.settings import Settings
 from app.solvers.registry import parse_parameters
 from policy_store.backup import back_up
 from policy_store.database import Database
-from policy_store.errors import BackupFailed
+from policy_store.errors import BackupFailed, PolicyNotFound
 from policy_store.library import PolicyLibrary
 
 PLAIN_LINE_EVERY_S = 2.0
@@ -47,6 +49,13 @@ application.add_typer(keys, name="keys")
 
 Advance = Callable[[float, str], None]
 """Takes how much of the total is done, and a word about it."""
+
+class ExportFormat(StrEnum):
+    """What a policy can be written as."""
+
+    ONNX = "onnx"
+    CHECKPOINT = "checkpoint"
+
 
 Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
 Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
@@ -184,6 +193,32 @@ def train_universal(
         production.train_universal(file, work, parameters, workers, tell)
 
 
+@application.command()
+def export(
+    policy: Annotated[str, typer.Argument(help="Id of a policy in the library, or a checkpoint file.")],
+    out: Annotated[Path, typer.Option(help="Where to.")],
+    format: Annotated[
+        ExportFormat, typer.Option(help="onnx: the agent network, to run on board; or the checkpoint.")
+    ] = ExportFormat.ONNX,
+    data_dir: DataDir = None,
+) -> None:
+    """Write a policy of the library to a file, by default for a computer on board.
+
+    What that computer has to feed is in app/learning/ON_BOARD.md.
+    """
+    settings = _settings(data_dir=data_dir)
+    with _refusals():
+        data = _checkpoint(policy, settings)
+        digest = hashlib.sha256(data).hexdigest()
+        if format is ExportFormat.ONNX:
+            # Loads torch, which the other commands need not wait for.
+            from app.learning.export import to_onnx  # noqa: PLC0415 - slow to load
+
+            data = to_onnx(data)
+        out.write_bytes(data)
+    typer.echo(f"{out}: {len(data)} bytes, of the checkpoint with the SHA-256 {digest}", err=True)
+
+
 @keys.command("create")
 def create_key(
     role: Annotated[Role, typer.Option(help="allocate; or library: policies may be changed too.")],
@@ -242,6 +277,18 @@ def _settings(**given: Any) -> Settings:
             where = ".".join(map(str, problem["loc"]))
             typer.echo(f"setting {where}: {problem['msg']}", err=True)
         raise typer.Exit(2) from None
+
+
+def _checkpoint(policy: str, settings: Settings) -> bytes:
+    """Read the checkpoint of a policy, from a file or else from the library."""
+    if Path(policy).is_file():
+        return Path(policy).read_bytes()
+    with _library(settings) as (library, database):
+        seed_library(library, database)
+        try:
+            return library.checkpoint(policy)
+        except PolicyNotFound:
+            raise ValueError(f"{policy!r} is neither a file nor a policy in the library") from None
 
 
 @contextmanager
