@@ -50,6 +50,7 @@ application.add_typer(keys, name="keys")
 Advance = Callable[[float, str], None]
 """Takes how much of the total is done, and a word about it."""
 
+
 class ExportFormat(StrEnum):
     """What a policy can be written as."""
 
@@ -170,27 +171,27 @@ def train(
 
 @application.command()
 def train_universal(
-    file: Annotated[Path, typer.Option(help="The checkpoint; its stem becomes the policy's id.")],
-    work: Annotated[Path, typer.Option(help="Folder for demonstrations and the state of the training.")],
-    shards: Annotated[int, typer.Option(min=1, help="Files of demonstrations.")] = 400,
-    updates: Annotated[int, typer.Option(min=1, help="Steps of the optimiser.")] = 6000,
-    workers: Annotated[int, typer.Option(min=1, help="Processes, then threads.")] = os.cpu_count() or 1,
+    folder: Annotated[Path, typer.Option(help="Where the checkpoints are written.")],
+    work: Annotated[Path, typer.Option(help="Folder for demonstrations and states of trainings.")],
+    name: Annotated[str, typer.Option(help="Id of the general policy; a family's has the family behind it.")],
+    workers: Annotated[int, typer.Option(min=1, help="Processes or threads.")] = os.cpu_count() or 1,
 ) -> None:
-    """Train one policy for every number of UAVs, areas and materials.
+    """Train the policies for every number of UAVs, areas and materials: a general one and one a family.
 
-    Near-optimal plans of generated problems are searched first, then a network learns from them and from its
-    own episodes. A run that was interrupted goes on where it stopped.
+    Near-optimal plans of generated problems are searched, a network learns from them and from its own
+    episodes, plans are searched from what it does, and it learns on; then copies of it are fitted to each
+    family. A run that was interrupted goes on where it stopped.
     """
     # Loads torch, which the other commands need not wait for.
     from app.learning.universal import production  # noqa: PLC0415 - slow to load
 
-    parameters = production.UniversalTrainingParameters(shards=shards, updates=updates)
-    with _bar("universal policy", total=1.0) as advance:
+    with _bar("policies for every size", total=1.0) as advance:
 
         def tell(stage: str, share: float, said: str) -> None:
             advance(share, f"{stage} {said}")
 
-        production.train_universal(file, work, parameters, workers, tell)
+        parameters = production.UniversalTrainingParameters()
+        production.Production(work, parameters, workers, tell).run(folder, name)
 
 
 @application.command()

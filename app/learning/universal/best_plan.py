@@ -26,8 +26,11 @@ class BestPlan:
         self.reward = float(rewards_of(arrays, self.actions[None]).reward[0])
         self._plan: Plan | None = None
 
-    def consider(self, plans: Integers) -> None:
-        """Look at plans (B, S', M) and keep the best if it is better than all before."""
+    def consider(self, plans: Integers) -> float:
+        """Look at plans (B, S', M), keep the best if it is better than all before, and return its reward.
+
+        The reward is minus infinity where none of them is allowed.
+        """
         replay = rewards_of(self._arrays, plans)
         rewards = np.where(replay.rule == ALLOWED, replay.reward, -np.inf)
         best = int(rewards.argmax())
@@ -36,6 +39,7 @@ class BestPlan:
             self.actions[:] = self._arrays.shape[1]
             self.actions[: plans.shape[1]] = plans[best]
             self._plan = None
+        return float(rewards[best])
 
     @property
     def plan(self) -> Plan:

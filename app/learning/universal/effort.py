@@ -8,11 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from app.simulation.arrays import ProblemArrays
 from app.solvers.local_search.effort import default_moves
 
 _MOST_WORK = 6e7
 """Work of a greedy roll-out that is done without being asked for; some seconds."""
+
+_ORDERING_WORK = 3e6
+"""Work of all greedy roll-outs of a policy together."""
+
+_ORDERS = 8
 
 _SAMPLING_WORK = 6e6
 """Work of all sampled roll-outs together; about a third of a second."""
@@ -37,11 +44,14 @@ class Effort:
     ----------
     policy
         Whether a policy is rolled out at all.
+    orders
+        Orders of UAVs in which a policy is rolled out, at least 1.
     samples, n_epochs, polish_moves
         By the names of the parameters.
     """
 
     policy: bool
+    orders: int
     samples: int
     n_epochs: int
     polish_moves: int
@@ -52,6 +62,7 @@ def effort(arrays: ProblemArrays) -> Effort:
     work = roll_out_work(arrays)
     return Effort(
         policy=work <= _MOST_WORK,
+        orders=int(np.clip(_ORDERING_WORK / work, 1, _ORDERS)),
         samples=int(min(_SAMPLES, _SAMPLING_WORK / work)),
         n_epochs=_EPOCHS if work <= _TUNING_WORK else 0,
         polish_moves=round(_POLISH_SHARE * default_moves(arrays)),

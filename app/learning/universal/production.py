@@ -1,15 +1,23 @@
-"""Making a policy for every size from nothing: demonstrations, training, metrics, the file for the library.
+"""Making the library's policies for every size from nothing; every stage goes on where it stopped.
 
-Every stage leaves files behind and goes on where it stopped. On two cores the defaults take about an hour.
+1. Near-optimal plans of generated problems are searched.
+2. A policy is fitted to them.
+3. Plans of new problems are searched, beginning from what that policy does.
+4. The policy is fitted further, to those: the general policy.
+5. For each family of problems a copy of it is fitted to that family's plans alone: a specialised policy.
+6. Each is measured on fresh problems of every family and written.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import torch
@@ -18,12 +26,14 @@ from pydantic import Field
 from app.learning.checkpoint import encode
 from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.curriculum import Shard
-from app.learning.universal.demonstrations import demonstrate, write_shard
+from app.learning.universal.demonstrations import Series, demonstrate, read_shard, save_shard, write_shard
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.rollout import play
-from app.learning.universal.trainer import Schedule, fit, initial
+from app.learning.universal.trainer import Schedule, Watch, fit, unwatched
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.protocol import Parameters
+
+Item = TypeVar("Item")
 
 Tell = Callable[[str, float, str], None]
 """Takes a stage, the share of it that is done, and a word about it."""
@@ -37,18 +47,30 @@ METRIC_MOVES = 400_000
 _FRESH = 1_000_003
 """Keeps the streams of the metrics' problems apart from those of the demonstrations."""
 
+SEARCHED = Series("demonstrations")
+IMPROVED = Series("improved", (1,))
+
+GENERAL = "every family, every size"
+"""Name of the general policy."""
+
 
 class UniversalTrainingParameters(Parameters):
-    """What a training of a policy for every size is made with."""
+    """What a training of policies for every size is made with."""
 
-    shards: int = Field(default=400, ge=1, description="Files of demonstrations, up to 64 problems each")
-    updates: int = Field(default=6000, ge=1, description="Steps of the optimiser")
-    lr: float = Field(default=2e-3, gt=0, description="Highest learning rate of Adam")
+    shards: int = Field(default=240, ge=1, description="Files of searched plans, up to 64 problems each")
+    updates: int = Field(default=5000, ge=1, description="Steps of the optimiser on them")
+    lr: float = Field(default=2e-3, gt=0, description="Highest learning rate of Adam on them")
+    improved_shards: int = Field(default=80, ge=1, description="Files of plans searched from the policy's")
+    improved_updates: int = Field(default=1800, ge=1, description="Steps of the optimiser on those")
+    improved_lr: float = Field(default=7e-4, gt=0, description="Highest learning rate on those")
+    family_shards: int = Field(default=6, ge=1, description="Files of plans of one family")
+    family_updates: int = Field(default=200, ge=1, description="Steps of the optimiser on a family")
+    family_lr: float = Field(default=3e-4, gt=0, description="Highest learning rate on a family")
     td_weight: float = Field(default=0.2, ge=0, description="Weight of the TD loss beside the cross-entropy")
     width: int = Field(default=64, ge=4, multiple_of=4, description="Width of a token")
     layers: int = Field(default=2, ge=1, description="Attention layers")
     qmix_hidden_dim: int = Field(default=32, ge=1, description="Hidden units of the mixing network")
-    metric_problems: int = Field(default=16, ge=1, description="Fresh problems a family to measure it on")
+    metric_problems: int = Field(default=32, ge=1, description="Fresh problems a family to measure on")
     seed: int = Field(default=123, ge=0, description="Source of all randomness")
 
     @property
@@ -56,109 +78,170 @@ class UniversalTrainingParameters(Parameters):
         """Sizes of the networks."""
         return UniversalConfig(self.width, self.layers, self.qmix_hidden_dim)
 
-    @property
-    def schedule(self) -> Schedule:
-        """How the networks are fitted."""
-        return Schedule(self.updates, self.lr, self.td_weight, self.seed)
 
-
-def train_universal(
-    file: Path, work: Path, parameters: UniversalTrainingParameters, workers: int, tell: Tell
-) -> None:
-    """Train a policy for every size and write it as a checkpoint.
+@dataclass(frozen=True, slots=True)
+class Production:
+    """One making of policies.
 
     Parameters
     ----------
-    file
-        The checkpoint; its stem becomes the policy's id.
     work
-        Folder of what the stages leave behind: demonstrations, and the state of the training.
+        Folder of what the stages leave behind: demonstrations, and states of trainings.
     parameters
-        What to train.
+        What to make.
     workers
-        Processes that make demonstrations, then threads that train.
+        Processes, or threads, that work at the same time.
     tell
         Told about progress.
     """
-    work.mkdir(parents=True, exist_ok=True)
-    shards = _demonstrations(work, parameters, workers, tell)
-    state = work / "training.safetensors"
-    before = torch.get_num_threads()
-    torch.set_num_threads(workers)
-    try:
-        agent, mixer = initial(parameters.config, parameters.seed)
-        fit(
-            agent,
-            mixer,
-            shards,
-            parameters.schedule,
-            state,
-            lambda update, losses: tell("training", update / parameters.updates, _words(losses)),
+
+    work: Path
+    parameters: UniversalTrainingParameters
+    workers: int
+    tell: Tell
+
+    def run(self, folder: Path, name: str) -> list[Path]:
+        """Make the policies and write them as checkpoints, the general one first.
+
+        Parameters
+        ----------
+        folder
+            Where to; made where missing.
+        name
+            Stem of the general policy's file, which becomes its id; a family's has the family behind it.
+        """
+        self.work.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        p = self.parameters
+        searched = self._shards(SEARCHED, p.shards, None)
+        first = self._fit("searched", None, searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
+        improved = self._shards(IMPROVED, p.improved_shards, first)
+        schedule = Schedule(p.improved_updates, p.improved_lr, p.td_weight, p.seed)
+        general = self._fit("general", first, improved, schedule)
+        specialised = self._specialise(general)
+        measured = self._measured()
+        files = [self._write(folder / f"{name}.safetensors", general, GENERAL, tuple(FAMILIES), measured)]
+        for family, state in specialised.items():
+            file = folder / f"{name}-{family.replace('_', '-')}.safetensors"
+            files.append(self._write(file, state, f"{family}, every size", (family,), measured))
+        return files
+
+    def _shards(self, series: Series, count: int, policy: Path | None) -> list[Path]:
+        job = partial(_write_shard, self.work, series, self.parameters, policy)
+        return self._in_processes(series.name, job, range(count))
+
+    def _fit(self, stage: str, start: Path | None, shards: list[Path], schedule: Schedule) -> Path:
+        """Fit in this process, with all threads; return the state."""
+        state = self.work / f"{stage}.safetensors"
+        before = torch.get_num_threads()
+        torch.set_num_threads(self.workers)
+        try:
+            _fit(
+                start, shards, schedule, state, self.parameters.config, partial(self._watch, stage, schedule)
+            )
+        finally:
+            torch.set_num_threads(before)
+        return state
+
+    def _specialise(self, general: Path) -> dict[str, Path]:
+        """Fit a copy to each family, families side by side; return the states."""
+        job = partial(_specialise, self.work, self.parameters, general)
+        return dict(zip(FAMILIES, self._in_processes("families", job, tuple(FAMILIES)), strict=True))
+
+    def _measured(self) -> dict[str, Path]:
+        """Search plans of the fresh problems on which policies are measured."""
+        job = partial(_write_measured, self.work, self.parameters)
+        return dict(zip(FAMILIES, self._in_processes("fresh problems", job, tuple(FAMILIES)), strict=True))
+
+    def _write(
+        self, file: Path, state: Path, name: str, families: tuple[str, ...], measured: dict[str, Path]
+    ) -> Path:
+        p, policy = self.parameters, UniversalPolicy.of_training(state, self.parameters.config)
+        metrics: dict[str, float | int] = {
+            f"greedy_ratio_{family}": round(greedy_ratio(policy, path), 4)
+            for family, path in measured.items()
+        }
+        data = encode(
+            policy,
+            config=policy.config,
+            task=generate(families[0], *METRIC_SHAPE, np.random.default_rng([p.seed, _FRESH])),
+            algorithm="qmix",
+            seed=p.seed,
+            parameters=p,
+            metrics=metrics,
+            name=name,
+            families=list(families),
         )
-    finally:
-        torch.set_num_threads(before)
-    write_policy(file, UniversalPolicy.of_training(state, parameters.config), parameters, tell)
+        part = file.with_suffix(".part")
+        part.write_bytes(data)
+        os.replace(part, file)
+        self.tell("metrics", 1.0, name)
+        return file
+
+    def _in_processes(self, stage: str, job: Callable[[Item], Path], items: Iterable[Item]) -> list[Path]:
+        """Do a job for every item in processes; results in the items' order."""
+        with ProcessPoolExecutor(self.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+            futures: list[Future[Path]] = [pool.submit(job, item) for item in items]
+            for done, future in enumerate(as_completed(futures)):
+                future.result()
+                self.tell(stage, (done + 1) / len(futures), "")
+            return [future.result() for future in futures]
+
+    def _watch(self, stage: str, schedule: Schedule, update: int, losses: dict[str, float]) -> None:
+        words = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+        self.tell(stage, update / schedule.updates, words)
 
 
-def write_policy(
-    file: Path, policy: UniversalPolicy, parameters: UniversalTrainingParameters, tell: Tell
-) -> None:
-    """Measure a trained policy on fresh problems of every family and write its checkpoint.
-
-    Parameters
-    ----------
-    file
-        The checkpoint, with everything in it that the library needs.
-    policy, parameters
-        What was trained, and how.
-    tell
-        Told about progress.
-    """
-    metrics: dict[str, float | int] = {"updates": parameters.updates}
-    for number, family in enumerate(FAMILIES):
-        metrics[f"greedy_ratio_{family}"] = round(greedy_ratio(policy, family, parameters.metric_problems), 4)
-        tell("metrics", (number + 1) / len(FAMILIES), family)
-    data = encode(
-        policy,
-        config=policy.config,
-        task=generate("uniform", *METRIC_SHAPE, np.random.default_rng([parameters.seed, _FRESH])),
-        algorithm="qmix",
-        seed=parameters.seed,
-        parameters=parameters,
-        metrics=metrics,
-        name="every family, every size",
-        families=list(FAMILIES),
-    )
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_suffix(".part")
-    partial.write_bytes(data)
-    os.replace(partial, file)
-
-
-def greedy_ratio(policy: UniversalPolicy, family: str, count: int) -> float:
-    """Mean share of a searched plan's reward that greedy roll-outs earn on fresh problems of a family."""
-    rng = np.random.default_rng([_FRESH, *family.encode()])
-    problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(count)]
-    m, n, _ = METRIC_SHAPE
-    shown = demonstrate(Shard(m, n, problems, METRIC_MOVES), rng)
+def greedy_ratio(policy: UniversalPolicy, measured: Path) -> float:
+    """Mean share of a searched plan's reward that a greedy roll-out earns, on the problems of a shard."""
+    shown = read_shard(measured)
     played = play(policy.agent, shown.arrays, np.arange(len(shown.rewards)))
     return float(np.mean(played.rewards / shown.rewards))
 
 
-def _demonstrations(
-    work: Path, parameters: UniversalTrainingParameters, workers: int, tell: Tell
-) -> list[Path]:
-    found: dict[int, Path] = {}
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {
-            pool.submit(write_shard, work, parameters.seed, number): number
-            for number in range(parameters.shards)
-        }
-        for future in as_completed(futures):
-            found[futures[future]] = future.result()
-            tell("demonstrations", len(found) / parameters.shards, "")
-    return [found[number] for number in range(parameters.shards)]
+@lru_cache(maxsize=1)
+def _policy(state: Path, config: UniversalConfig) -> UniversalPolicy:
+    torch.set_num_threads(1)
+    return UniversalPolicy.of_training(state, config)
 
 
-def _words(losses: dict[str, float]) -> str:
-    return ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
+def _write_shard(
+    work: Path, series: Series, parameters: UniversalTrainingParameters, policy: Path | None, number: int
+) -> Path:
+    agent = None if policy is None else _policy(policy, parameters.config).agent
+    return write_shard(work, series, parameters.seed, number, agent)
+
+
+def _fit(
+    start: Path | None,
+    shards: list[Path],
+    schedule: Schedule,
+    state: Path,
+    config: UniversalConfig,
+    watch: Watch = unwatched,
+) -> None:
+    policy = UniversalPolicy.of_seed(config, schedule.seed)
+    if start is not None:
+        policy = UniversalPolicy.of_training(start, config)
+    fit(policy.agent, policy.mixer, shards, schedule, state, watch)
+
+
+def _specialise(work: Path, parameters: UniversalTrainingParameters, general: Path, family: str) -> Path:
+    """Make a family's demonstrations and fit a copy of the general policy to them, in one thread."""
+    p, state = parameters, work / f"family-{family}.safetensors"
+    series = Series(f"improved-{family}", (2, *family.encode()), (family,))
+    shards = [_write_shard(work, series, p, general, number) for number in range(p.family_shards)]
+    schedule = Schedule(p.family_updates, p.family_lr, p.td_weight, p.seed)
+    _fit(general, shards, schedule, state, p.config)
+    return state
+
+
+def _write_measured(work: Path, parameters: UniversalTrainingParameters, family: str) -> Path:
+    count = parameters.metric_problems
+    path = work / f"fresh-{family}-{count}.npz"
+    if not path.exists():
+        m, n, _ = METRIC_SHAPE
+        rng = np.random.default_rng([_FRESH, *family.encode()])
+        problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(count)]
+        save_shard(path, demonstrate(Shard(m, n, problems, METRIC_MOVES), rng))
+    return path

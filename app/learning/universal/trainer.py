@@ -24,17 +24,26 @@ from app.learning.universal.learner import Batch, Learner, make_batch
 from app.learning.universal.mixer import UniversalMixer
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.rollout import play
-from app.learning.universal.unfolding import unfold
-from app.simulation.arrays import ProblemArrays
+from app.learning.universal.turn_order import draw_orders, reorder, reorder_plans
+from app.learning.universal.unfolding import of_uavs, unfold
+from app.simulation.arrays import Integers, ProblemArrays
+from app.simulation.simulator import ALLOWED, replay
 
-TURN_TOKENS = 32_000
+TURN_TOKENS = 20_000
 """Tokens an update sees, about: turns times targets."""
+
+MIN_SHARE = 0.4
+"""Where a single episode is longer than ``TURN_TOKENS`` by more than this share allows, only some of its UAVs
+are learned from, and without the TD loss, which needs all of them."""
 
 OWN_EVERY = 16
 """Every so many updates the policy learns from its own episodes instead of demonstrations."""
 
 TD_EVERY = 4
 """Every so many updates the TD loss is added; it needs the target networks' values, so it is not cheap."""
+
+WARM_UP = 200
+"""Updates over which the learning rate rises."""
 
 SAVE_EVERY = 200
 """Updates between two states on disk."""
@@ -49,7 +58,7 @@ class Schedule:
     updates
         Steps of the optimiser.
     lr
-        Highest learning rate; it rises over the first 200 updates and falls as a half cosine to the end.
+        Highest learning rate; it rises over ``WARM_UP`` updates and falls as a half cosine to the end.
     td_weight
         Weight of the loss of QMIX beside the cross-entropy.
     seed
@@ -63,10 +72,14 @@ class Schedule:
 
     def share_of_lr(self, update: int) -> float:
         """Return what part of the learning rate an update takes."""
-        return min(1.0, (update + 1) / 200) * (0.5 + 0.5 * float(np.cos(np.pi * update / self.updates)))
+        return min(1.0, (update + 1) / WARM_UP) * (0.5 + 0.5 * float(np.cos(np.pi * update / self.updates)))
 
 
 Watch = Callable[[int, dict[str, float]], None]
+
+
+def unwatched(_update: int, _losses: dict[str, float]) -> None:
+    """Nobody is told."""
 
 
 def fit(
@@ -98,8 +111,8 @@ def fit(
     with ThreadPoolExecutor(1) as ahead:
         following = ahead.submit(_demonstrated, shards, schedule.seed, done)
         for update in range(done, schedule.updates):
-            demonstrated = update % OWN_EVERY != OWN_EVERY - 1
-            arrays, batch = following.result()
+            arrays, batch, whole = following.result()
+            demonstrated = not whole or update % OWN_EVERY != OWN_EVERY - 1
             following = ahead.submit(_demonstrated, shards, schedule.seed, update + 1)
             if not demonstrated:
                 batch = _own(agent, arrays, np.random.default_rng([schedule.seed, update, 1]))
@@ -107,7 +120,7 @@ def fit(
                 batch,
                 schedule.share_of_lr(update),
                 imitate=demonstrated,
-                bootstrap=update % TD_EVERY == TD_EVERY - 1,
+                bootstrap=whole and update % TD_EVERY == TD_EVERY - 1,
             )
             for name, loss in losses.items():
                 means[name] = 0.98 * means.get(name, loss) + 0.02 * loss
@@ -130,15 +143,35 @@ def _read(path: Path) -> Demonstrations:
     return read_shard(path)
 
 
-def _demonstrated(shards: list[Path], seed: int, update: int) -> tuple[ProblemArrays, Batch]:
+def _demonstrated(shards: list[Path], seed: int, update: int) -> tuple[ProblemArrays, Batch, bool]:
+    """Some demonstrations of a shard, and whether all turns are there; of large episodes it is some UAVs'."""
     rng = np.random.default_rng([seed, update, 0])
     shown = _read(shards[rng.integers(len(shards))])
     m, n, _ = shown.arrays.shape
-    count = min(len(shown.rewards), max(4, TURN_TOKENS // (2 * m * n)))
+    count = min(len(shown.rewards), max(1, TURN_TOKENS // (2 * m * n)))
     chosen = rng.choice(len(shown.rewards), count, replace=False)
     arrays = ProblemArrays(**{name: column[chosen] for name, column in shown.arrays._asdict().items()})
-    turns = unfold(arrays, np.arange(count), shown.plans[chosen])
-    return arrays, make_batch(arrays, turns, torch.device("cpu"))
+    arrays, plans = _in_random_order(arrays, shown.plans[chosen], rng)
+    turns = unfold(arrays, np.arange(count), plans)
+    share = TURN_TOKENS / (len(turns.action) * n)
+    whole = share > MIN_SHARE
+    if not whole:
+        turns = of_uavs(turns, rng.permutation(m)[: max(1, round(share * m))])
+    return arrays, make_batch(arrays, turns, torch.device("cpu")), whole
+
+
+def _in_random_order(
+    arrays: ProblemArrays, plans: Integers, rng: np.random.Generator
+) -> tuple[ProblemArrays, Integers]:
+    """Let the UAVs act in random orders, but for plans that are only legal in the order they have.
+
+    Two UAVs that are at one target in the same step unload in the order in which they act.
+    """
+    count, _, m = plans.shape
+    orders = draw_orders(count, m, rng)
+    legal = replay(reorder(arrays, orders), reorder_plans(plans, orders), np.arange(count)).rule == ALLOWED
+    orders = np.where(legal[:, None], orders, np.arange(m))
+    return reorder(arrays, orders), reorder_plans(plans, orders)
 
 
 def _own(agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator) -> Batch:

@@ -1,7 +1,8 @@
 """Transfer-QMIX in service mode: a policy for every size, rolled out, sampled, fine-tuned and polished.
 
 Each part only ever adds plans; the best by its true reward is kept. The features of the policy do not change
-when a map is rotated or mirrored, so trying a problem in its eight positions would give eight times the same.
+when a map is rotated or mirrored, so trying a problem in its eight positions would give eight times the same;
+the order in which UAVs act does change what it does, so that is what is tried.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from app.learning.universal.effort import Effort, batch_of, effort
 from app.learning.universal.fine_tuning import FineTuning, require_memory
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
-from app.learning.universal.rollout import play
+from app.learning.universal.rollout import play, play_in_orders
+from app.learning.universal.turn_order import some_orders
 from app.simulation.arrays import compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
@@ -29,6 +31,12 @@ from app.solvers.protocol import History, Progress, Report, Solution, StopCriter
 
 FINE_TUNING_LR = 1e-4
 """Learning rate of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
+
+_TRIED_AT_SIGHT = 2
+"""Policies of the shortlist that are tried where a greedy roll-out is all that is asked for."""
+
+_TEMPERATURE = 0.5
+"""Of sampled roll-outs: cooler than what the policy was trained for, since the best of few is what counts."""
 
 _SHARES = {"roll-out": 0.05, "samples": 0.35, "fine-tuning": 0.55, "polish": 1.0}
 """Share of the work that is done at the end of each part."""
@@ -75,7 +83,9 @@ class UniversalTransfer:
         self._best = BestPlan(self._arrays)
         self._history = History()
         root = np.random.SeedSequence([abs(seed), int(seed < 0)])
-        self._sampling, self._tuning, self._polishing = map(np.random.default_rng, root.spawn(3))
+        streams = map(np.random.default_rng, root.spawn(4))
+        self._sampling, self._tuning, self._polishing, ordering = streams
+        self._orders = some_orders(self._effort.orders, problem.n_uavs, ordering)
 
     def run(self, sources: Sequence[Source]) -> Solution:
         """Solve it from the best of some policies for every size, nearest first.
@@ -118,11 +128,10 @@ class UniversalTransfer:
     def _roll_out(self, sources: Sequence[Source]) -> tuple[Source, float]:
         """Play each policy greedily; return the best, among equals the nearest, and what it earned."""
         found: list[tuple[Source, float]] = []
-        for source in sources:
+        for source in sources[:_TRIED_AT_SIGHT] if self._used.is_bare else sources:
             policy = cast(UniversalPolicy, source.network)
-            played = play(policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
-            self._best.consider(played.plans)
-            found.append((source, float(played.rewards[0])))
+            plans = play_in_orders(policy.agent, self._arrays, self._orders, stop=self._stop)
+            found.append((source, self._best.consider(plans)))
             if self._stop():
                 break
         return max(found, key=lambda each: each[1])
@@ -130,10 +139,19 @@ class UniversalTransfer:
     def _sample(self, policy: UniversalPolicy) -> None:
         done, samples = 0, self._used.samples
         while done < samples and not self._stop():
-            problem = np.zeros(batch_of(self._arrays, samples - done), np.int64)
-            played = play(policy.agent, self._arrays, problem, self._sampling, stop=self._stop)
-            self._best.consider(played.plans)
-            done += len(problem)
+            count = batch_of(self._arrays, samples - done)
+            orders = self._orders[: max(1, min(count, len(self._orders)))]
+            plans = play_in_orders(
+                policy.agent,
+                self._arrays,
+                orders,
+                -(-count // len(orders)),
+                self._sampling,
+                _TEMPERATURE,
+                self._stop,
+            )[:count]
+            self._best.consider(plans)
+            done += count
             self._tell("samples", done / samples)
 
     def _fine_tune(self, policy: UniversalPolicy) -> bytes | None:

@@ -74,6 +74,13 @@ def unfold(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
     return Turns(**columns, reward=turns.reward)
 
 
+def of_uavs(turns: Turns, uavs: Integers) -> Turns:
+    """Keep the turns of some UAVs only."""
+    kept = np.isin(turns.uav, uavs)
+    columns = {name: column[kept] for name, column in turns._asdict().items() if name != "reward"}
+    return Turns(**columns, reward=turns.reward)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _unfold(
     arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, plans: Integers, turns: Turns

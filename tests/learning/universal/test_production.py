@@ -1,27 +1,54 @@
-"""From nothing to the file of a policy, and again without doing anything twice."""
+"""From nothing to the files of all policies, and again without doing anything twice."""
 
 import torch
 
 from app.learning.checkpoint import decode
-from app.learning.universal.production import UniversalTrainingParameters, train_universal
+from app.learning.universal.production import Production, UniversalTrainingParameters
+from app.simulation.generator import FAMILIES
 
-PARAMETERS = UniversalTrainingParameters(shards=1, updates=2, width=8, layers=1, metric_problems=1)
+PARAMETERS = UniversalTrainingParameters(
+    shards=1,
+    updates=2,
+    improved_shards=1,
+    improved_updates=2,
+    family_shards=1,
+    family_updates=1,
+    width=8,
+    layers=1,
+    metric_problems=1,
+)
 
 
-def test_a_second_run_finds_everything_done(tmp_path):
+def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
+    monkeypatch.setattr("app.learning.universal.curriculum.SHAPES", ((3, 4, 1.0),))
     told, threads = [], torch.get_num_threads()
-    file, work = tmp_path / "library" / "policy.safetensors", tmp_path / "work"
-    train_universal(file, work, PARAMETERS, 1, lambda stage, share, said: told.append((stage, share)))
-    first = file.read_bytes()
+    folder, work = tmp_path / "library", tmp_path / "work"
+    production = Production(work, PARAMETERS, 2, lambda stage, share, said: told.append((stage, share)))
+    files = production.run(folder, "all")
+    first = [file.read_bytes() for file in files]
     changed = {path.name: path.stat().st_mtime_ns for path in work.iterdir()}
 
-    train_universal(file, work, PARAMETERS, 1, lambda stage, share, said: None)
+    assert production.run(folder, "all") == files
 
-    assert file.read_bytes() == first
+    assert [file.read_bytes() for file in files] == first
     assert {path.name: path.stat().st_mtime_ns for path in work.iterdir()} == changed
     assert torch.get_num_threads() == threads
-    assert [stage for stage, share in told if share == 1.0] == ["demonstrations", "training", "metrics"]
-    metadata = decode(first).metadata
-    ratios = [value for name, value in metadata["metrics"].items() if name.startswith("greedy_ratio")]
-    assert len(ratios) == len(metadata["families"])
-    assert all(ratio < 1.1 for ratio in ratios)
+    stages = [stage for stage, share in told if share == 1.0]
+    assert stages[:7] == [
+        "demonstrations", "searched", "improved", "general", "families", "fresh problems", "metrics"
+    ]  # fmt: skip
+    assert [file.stem for file in files] == [
+        "all",
+        *(f"all-{family.replace('_', '-')}" for family in FAMILIES),
+    ]
+    weights = set()
+    for file, families in zip(files, [list(FAMILIES), *([family] for family in FAMILIES)], strict=True):
+        checkpoint = decode(file.read_bytes())
+        assert checkpoint.metadata["families"] == families
+        ratios = [
+            value for name, value in checkpoint.metadata["metrics"].items() if name.startswith("greedy_ratio")
+        ]
+        assert len(ratios) == len(FAMILIES)
+        assert all(ratio < 1.1 for ratio in ratios)
+        weights.add(b"".join(tensor.numpy().tobytes() for tensor in checkpoint.network.state_dict().values()))
+    assert len(weights) == len(files)

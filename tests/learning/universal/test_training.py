@@ -11,13 +11,15 @@ from app.domain.records import problem_to_record
 from app.learning.universal import trainer
 from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.curriculum import SHAPES, Shard, draw_shard
-from app.learning.universal.demonstrations import demonstrate, read_shard, write_shard
+from app.learning.universal.demonstrations import Series, demonstrate, read_shard, write_shard
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.trainer import Schedule, fit, initial
+from app.simulation import simulator
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 
 SMALL = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+SERIES = Series("some", (4,), ("uniform", "scarce"))
 
 
 @pytest.fixture(scope="module")
@@ -93,19 +95,19 @@ def test_learning_rate_rises_and_falls():
 def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "app.learning.universal.demonstrations.draw_shard",
-        lambda rng: Shard(2, 4, [generate("uniform", 2, 4, 2, rng) for _ in range(3)], moves=500),
+        lambda rng, families: Shard(2, 4, [generate("uniform", 2, 4, 2, rng) for _ in range(3)], moves=500),
     )
     first, second = tmp_path / "a", tmp_path / "b"
     for folder in (first, second):
         folder.mkdir()
-    one, two = (read_shard(write_shard(folder, 7, 1)) for folder in (first, second))
+    one, two = (read_shard(write_shard(folder, SERIES, 7, 1)) for folder in (first, second))
     assert np.array_equal(one.plans, two.plans)
     assert all(np.array_equal(a, b) for a, b in zip(one.arrays, two.arrays, strict=True))
-    other = read_shard(write_shard(first, 7, 2))
+    other = read_shard(write_shard(first, SERIES, 7, 2))
     assert not np.array_equal(one.arrays.load, other.arrays.load)
-    path = write_shard(first, 7, 1)
+    path = write_shard(first, SERIES, 7, 1)
     written = path.stat().st_mtime_ns
-    assert write_shard(first, 7, 1).stat().st_mtime_ns == written
+    assert write_shard(first, SERIES, 7, 1).stat().st_mtime_ns == written
 
 
 def test_drawn_shards_have_the_listed_shapes():
@@ -117,10 +119,11 @@ def test_drawn_shards_have_the_listed_shapes():
         assert all(1 <= p.max_steps <= 7 for p in shard.problems)
 
 
-def test_demonstrations_are_legal_and_better_than_greedy():
+@pytest.mark.parametrize("agent", [None, initial(SMALL, 1)[0]], ids=["from greedy", "from a policy"])
+def test_demonstrations_are_legal_and_better_than_greedy(agent):
     rng = np.random.default_rng(10)
     problems = [generate("single_base", 5, 8, 2, rng) for _ in range(4)]
-    shown = demonstrate(Shard(5, 8, problems, moves=20_000), rng)
+    shown = demonstrate(Shard(5, 8, problems, moves=20_000), rng, agent)
     gained = 0.0
     for problem, plan, reward in zip(problems, shown.plans, shown.rewards, strict=True):
         record = problem_to_record(problem)
@@ -129,3 +132,25 @@ def test_demonstrations_are_legal_and_better_than_greedy():
         assert reward >= greedy - 1e-9
         gained += reward - greedy
     assert gained > 0.1
+
+
+def test_demonstrations_in_another_order_of_uavs_earn_the_same():
+    rng = np.random.default_rng(11)
+    problems = [generate("mixed_loads", 4, 9, 2, rng) for _ in range(6)]
+    shown = demonstrate(Shard(4, 9, problems, moves=20_000), rng)
+    arrays, plans = trainer._in_random_order(shown.arrays, shown.plans, rng)
+    again = simulator.replay(arrays, plans, np.arange(6))
+    assert (again.rule == simulator.ALLOWED).all()
+    assert np.abs(again.reward - shown.rewards).max() < 1e-9
+    assert not np.array_equal(plans, shown.plans)
+
+
+def test_of_large_episodes_some_uavs_are_learned_from(monkeypatch, shards):
+    monkeypatch.setattr(trainer, "TURN_TOKENS", 12)
+    _, batch, whole = trainer._demonstrated(shards, 0, 0)
+    assert not whole
+    assert len(batch.uav.unique()) == 1
+    monkeypatch.setattr(trainer, "TURN_TOKENS", 20_000)
+    _, batch, whole = trainer._demonstrated(shards, 0, 0)
+    assert whole
+    assert len(batch.uav.unique()) == 3

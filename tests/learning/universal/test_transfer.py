@@ -90,19 +90,38 @@ def nearest(problem):
     return sorted(FAMILIES, key=distance), distance
 
 
+@pytest.fixture
+def one_order(monkeypatch):
+    """UAVs act in the order of their indices only."""
+    monkeypatch.setattr("app.learning.universal.effort._ORDERS", 1)
+
+
+@pytest.mark.parametrize(("tried", "given"), [(2, {}), (SHORTLIST, {"samples": 1})])
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_best_of_the_nearest_few_is_transferred(store, policies, family):
+def test_the_best_of_the_nearest_few_is_transferred(store, policies, one_order, family, tried, given):
     problem = generate(family, 7, 11, 3, np.random.default_rng(22))
     order, distance = nearest(problem)
-    rewards = {name: greedy_reward(policies[name], problem) for name in order[:SHORTLIST]}
-    solution = solve(store, problem, **BARE)
+    rewards = {name: greedy_reward(policies[name], problem) for name in order[:tried]}
+    solution = solve(store, problem, **{**BARE, **given})
     assert solution.source_policy.id == max(rewards, key=rewards.get)
     assert solution.source_policy.distance == pytest.approx(distance(solution.source_policy.id), rel=1e-5)
     assert solution.history.epoch == [0]
     assert solution.history.reward == [pytest.approx(max(rewards.values()))]
 
 
-def test_bare_is_the_policys_greedy_roll_out(store, policies):
+def test_other_orders_of_uavs_can_only_help(store, policies):
+    gained = 0.0
+    for number in range(6):
+        problem = generate("uniform", 6, 9, 2, np.random.default_rng(33 + number))
+        solution = solve(store, problem, source="uniform", **BARE)
+        earned = reward_of(problem, solution.plan)
+        assert earned == pytest.approx(max(*solution.history.reward, 0.0))
+        assert earned >= greedy_reward(policies["uniform"], problem) - 1e-9
+        gained += earned - greedy_reward(policies["uniform"], problem)
+    assert gained > 0.01
+
+
+def test_bare_is_the_policys_greedy_roll_out(store, policies, one_order):
     for number in range(6):
         problem = generate("uniform", 6, 9, 2, np.random.default_rng(23 + number))
         for family in FAMILIES[:3]:
