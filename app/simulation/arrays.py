@@ -7,14 +7,16 @@ nothing, so neither is ever part of an allowed visit.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.geometry import distances
+from app.domain.geometry import distance
 from app.domain.problem import Problem
+from app.simulation.distances import between_points
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -81,20 +83,46 @@ class ProblemArrays(NamedTuple):
 
 
 def compile_problem(problem: Problem) -> ProblemArrays:
-    """Turn one problem into a stack of one."""
+    """Turn one problem into a stack of one.
+
+    A problem does not change, and a job asks for the same one again and again, in the search, beside it and
+    when the plan is explained: the newest problem's arrays are kept as long as the problem lives. They are
+    for reading; who wants others makes a copy.
+    """
+    global _newest  # noqa: PLW0603 - one entry, replaced as a whole
+    known = _newest
+    if known is not None and known[0]() is problem:
+        return known[1]
+    arrays = _compile(problem)
+    _newest = weakref.ref(problem, _forget), arrays
+    return arrays
+
+
+_newest: tuple[weakref.ref[Problem], ProblemArrays] | None = None
+
+
+def _forget(gone: weakref.ref[Problem]) -> None:
+    global _newest  # noqa: PLW0603 - as above
+    if _newest is not None and _newest[0] is gone:
+        _newest = None
+
+
+def _compile(problem: Problem) -> ProblemArrays:
     uavs, targets = problem.uavs, problem.targets
     start = np.array([(u.x_s, u.y_s) for u in uavs], dtype=np.float64)
     current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
     area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
     need = np.array([t.loadlist for t in targets], dtype=np.float64)
-    start_home = np.array(
-        [distances(problem.crs, current[i : i + 1], start[i : i + 1])[0, 0] for i in range(len(uavs))]
-    )
+    start_target = between_points(problem.crs, current, area)
+    # Most swarms are where they start, and have the same way to a target as home from it.
+    home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, area)
     return ProblemArrays(
-        start_target=distances(problem.crs, current, area)[None],
-        between=distances(problem.crs, area, area)[None],
-        home=distances(problem.crs, start, area)[None],
-        start_home=start_home[None],
+        start_target=start_target[None],
+        between=between_points(problem.crs, area, area)[None],
+        home=home[None],
+        start_home=np.array(
+            [[distance(problem.crs, u.x_c, u.y_c, u.x_s, u.y_s) for u in uavs]], dtype=np.float64
+        ),
         speed=np.array([[u.speed for u in uavs]], dtype=np.float64),
         voyage=np.array([[u.voyage for u in uavs]], dtype=np.float64),
         dis=np.array([[u.dis for u in uavs]], dtype=np.float64),
