@@ -20,7 +20,7 @@ from app.api.job_kinds import job_kinds
 from app.api.json_body import BodyLimit
 from app.api.metrics import Metrics
 from app.api.request_log import RequestLog
-from app.api.routes import algorithms, allocation, examples, jobs, library, operations
+from app.api.routes import algorithms, allocation, examples, jobs, library, operations, plans
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.jobs.local import LocalExecutor
@@ -98,7 +98,7 @@ def create_application(settings: Settings) -> FastAPI:
         generate_unique_id_function=operation_id,
         middleware=_middleware(settings, metrics),
     )
-    for room in (allocation, algorithms, jobs, library, examples, operations):
+    for room in (allocation, algorithms, jobs, plans, library, examples, operations):
         application.include_router(room.router)
     install_error_handlers(application)
     install_documentation(application, keys_required=settings.always_needs_keys)

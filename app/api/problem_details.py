@@ -40,6 +40,12 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "idempotency-key-reused": HTTPStatus.UNPROCESSABLE_ENTITY,
     "job-cancelled": HTTPStatus.CONFLICT,
     "job-without-checkpoint": HTTPStatus.CONFLICT,
+    # app.api.plan_formats
+    "uav-not-found": HTTPStatus.NOT_FOUND,
+    "no-plan": HTTPStatus.CONFLICT,
+    "nothing-to-fly": HTTPStatus.CONFLICT,
+    "plan-not-geographic": HTTPStatus.CONFLICT,
+    "plan-out-of-range": HTTPStatus.CONFLICT,
     "queue-full": HTTPStatus.TOO_MANY_REQUESTS,
     "draining": HTTPStatus.SERVICE_UNAVAILABLE,
     "not-ready": HTTPStatus.SERVICE_UNAVAILABLE,

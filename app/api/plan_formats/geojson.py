@@ -1,0 +1,129 @@
+"""The whole plan as GeoJSON (RFC 7946): starting points, areas, and a line a route."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+
+Point = tuple[float, float]
+
+MEDIA_TYPE = "application/geo+json"
+
+
+def geojson(plan: FlownPlan) -> str:
+    """Write a feature collection: a Point a UAV and an area, a LineString a UAV that flies.
+
+    The positions of a ``local`` problem are no longitudes and latitudes, which RFC 7946 has only by prior
+    arrangement: the member ``coordinates`` says which they are. A line that crosses the antimeridian is cut
+    there into a MultiLineString (section 3.1.9).
+    """
+    geographic = plan.problem.crs == "wgs84"
+    features = [_start(route) for route in plan.routes]
+    features += _areas(plan)
+    features += [_line(route, geographic=geographic) for route in plan.flying]
+    content = {
+        "type": "FeatureCollection",
+        "coordinates_are": "longitude and latitude in degrees (WGS 84)" if geographic else "x and y, local",
+        "plan": {
+            "job_id": plan.job_id,
+            "algorithm": plan.algorithm,
+            "reward": plan.reward,
+            "satisfaction": plan.satisfaction,
+            "distance": plan.distance,
+        },
+        "features": features,
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _start(route: FlownRoute) -> dict[str, Any]:
+    uav = route.uav
+    return _feature(
+        "uav",
+        "Point",
+        [uav.x_c, uav.y_c],
+        uav_id=uav.id,
+        home=[uav.x_s, uav.y_s],
+        speed=uav.speed,
+        voyage=uav.voyage,
+        range_left=uav.voyage - uav.dis,
+        loadlist=list(uav.loadlist),
+    )
+
+
+def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
+    unmet = {each.target.id: each for each in plan.unmet}
+    features = []
+    for target in plan.problem.targets:
+        missing = unmet.get(target.id)
+        features.append(
+            _feature(
+                "area",
+                "Point",
+                [target.x, target.y],
+                target_id=target.id,
+                level=target.level,
+                needs=list(target.loadlist),
+                remaining=[0.0] * len(target.loadlist) if missing is None else list(missing.remaining),
+                reason=None if missing is None else missing.reason,
+                deadline=target.deadline,
+            )
+        )
+    return features
+
+
+def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
+    uav = route.uav
+    places = [(uav.x_c, uav.y_c), *((stop.target.x, stop.target.y) for stop in route.stops)]
+    if route.return_distance > 0:
+        places.append((uav.x_s, uav.y_s))
+    lines = _cut(places) if geographic else [places]
+    several = len(lines) > 1
+    coordinates = [[list(point) for point in line] for line in lines]
+    return _feature(
+        "route",
+        "MultiLineString" if several else "LineString",
+        coordinates if several else coordinates[0],
+        uav_id=uav.id,
+        distance=route.distance,
+        return_distance=route.return_distance,
+        range_left=route.range_left,
+        return_time=route.return_time,
+        stops=[
+            {
+                "target_id": stop.target.id,
+                "step": stop.step,
+                "arrival_time": stop.arrival_time,
+                "distance": stop.distance,
+                "delivered": list(stop.delivered),
+                "range_left": stop.range_left,
+            }
+            for stop in route.stops
+        ],
+    )
+
+
+def _cut(places: Sequence[Point]) -> list[list[Point]]:
+    """Cut a line where it crosses the antimeridian; every leg takes the shorter way round."""
+    lines = [[places[0]]]
+    for (x_a, y_a), (x_b, y_b) in pairwise(places):
+        if abs(x_b - x_a) > 180.0:
+            edge = 180.0 if x_a > 0 else -180.0
+            there = x_b + 2 * edge
+            y = y_a if there == x_a else y_a + (y_b - y_a) * (edge - x_a) / (there - x_a)
+            lines[-1].append((edge, y))
+            lines.append([(-edge, y)])
+        lines[-1].append((x_b, y_b))
+    return lines
+
+
+def _feature(kind: str, geometry: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "geometry": {"type": geometry, "coordinates": coordinates},
+        "properties": {"kind": kind, **properties},
+    }

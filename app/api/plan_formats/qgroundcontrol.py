@@ -1,0 +1,111 @@
+"""Flight files for one UAV: QGroundControl's ``.plan`` (JSON) and the older ``QGC WPL 110`` (tabs)."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from typing import Any
+
+from app.api.plan_formats.flown_plan import FlownRoute
+from app.api.plan_formats.mission import (
+    AltitudeReference,
+    Command,
+    FlightChoices,
+    Frame,
+    MissionItem,
+    mission,
+    speed_m_s,
+)
+
+_ARDUPILOT = 3
+_MULTICOPTER = 2
+_ALTITUDE_MODE = {AltitudeReference.HOME: 1, AltitudeReference.TERRAIN: 4}
+_UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
+    """Write a ``.plan``, version 1, with a mission of version 2 of simple items; no fence, no rally points.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`~app.api.plan_formats.mission.mission` does.
+    """
+    items = mission(route, choices)
+    altitude_mode = _ALTITUDE_MODE[choices.altitude_reference]
+    speed = speed_m_s(route)
+    content = {
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "QGroundControl",
+        "geoFence": {"version": 2, "circles": [], "polygons": []},
+        "rallyPoints": {"version": 2, "points": []},
+        "mission": {
+            "version": 2,
+            "firmwareType": _ARDUPILOT,
+            "vehicleType": _MULTICOPTER,
+            "globalPlanAltitudeMode": altitude_mode,
+            "cruiseSpeed": speed,
+            "hoverSpeed": speed,
+            "plannedHomePosition": [route.uav.y_s, route.uav.x_s, 0],
+            "items": [_simple_item(number, item, altitude_mode) for number, item in enumerate(items, 1)],
+        },
+    }
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
+    """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots expect.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`~app.api.plan_formats.mission.mission` does.
+    """
+    home = MissionItem(
+        Command.WAYPOINT, Frame.RELATIVE_ALTITUDE, (0.0, 0.0, 0.0, 0.0), (route.uav.x_s, route.uav.y_s, 0.0)
+    )
+    lines = ["QGC WPL 110"]
+    for number, item in enumerate((home, *mission(route, choices))):
+        longitude, latitude, altitude = item.place or (0.0, 0.0, 0.0)
+        # Ground stations and autopilots that read this format read no NaN: 0 is its "leave it as it is".
+        params = [0.0 if math.isnan(value) else value for value in item.params]
+        fields = [
+            str(number),
+            str(int(number == 0)),
+            str(item.frame.value),
+            str(item.command.value),
+            *(f"{value:.8f}" for value in (*params, latitude, longitude)),
+            f"{altitude:.6f}",
+            "1",
+        ]
+        lines.append("\t".join(fields))
+    return "\n".join(lines) + "\n"
+
+
+def file_name(route: FlownRoute, ending: str) -> str:
+    """Name a UAV's file by its place in the swarm, from 1, and its id as far as file systems take it."""
+    identifier = _UNSAFE.sub("_", route.uav.id).strip("._") or "uav"
+    return f"{route.number + 1:03d}-{identifier[:60]}.{ending}"
+
+
+def _simple_item(number: int, item: MissionItem, altitude_mode: int) -> dict[str, Any]:
+    params = [None if math.isnan(value) else value for value in item.params]
+    content: dict[str, Any] = {
+        "type": "SimpleItem",
+        "command": item.command.value,
+        "frame": item.frame.value,
+        "doJumpId": number,
+        "autoContinue": True,
+    }
+    if item.place is None:
+        return {**content, "params": [*params, 0, 0, 0]}
+    longitude, latitude, altitude = item.place
+    return {
+        **content,
+        "params": [*params, latitude, longitude, altitude],
+        "Altitude": altitude,
+        "AltitudeMode": altitude_mode,
+        "AMSLAltAboveTerrain": None,
+    }

@@ -1,0 +1,217 @@
+"""GET /jobs/{job_id}/plan: a plan to take away, for ground stations, maps, tables and paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from app.api.job_models import result_of
+from app.api.plan_formats import mission
+from app.api.plan_formats.archive import zip_archive
+from app.api.plan_formats.csv_table import csv_table
+from app.api.plan_formats.errors import NoPlan, NotGeographic, NothingToFly, UnknownUAV
+from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, flown_plan
+from app.api.plan_formats.geojson import MEDIA_TYPE as GEOJSON
+from app.api.plan_formats.geojson import geojson
+from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
+from app.api.plan_formats.printed_page import printed_page
+from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
+from app.api.problem_details import responses
+from app.api.routes.jobs import JobId
+from app.api.services import Served
+from app.domain.records import problem_from_record
+from app.jobs.model import Job
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+
+class PlanFormat(StrEnum):
+    """What a plan can be taken away as."""
+
+    GEOJSON = "geojson"
+    QGC_PLAN = "qgc-plan"
+    QGC_WPL = "qgc-wpl"
+    CSV = "csv"
+    HTML = "html"
+
+
+@dataclass(frozen=True, slots=True)
+class _Document:
+    """A format of the whole plan."""
+
+    write: Callable[[FlownPlan], str]
+    media_type: str
+    ending: str
+
+
+@dataclass(frozen=True, slots=True)
+class _FlightFile:
+    """A format of one UAV's flight."""
+
+    write: Callable[[FlownRoute, FlightChoices], str]
+    media_type: str
+    ending: str
+
+
+_FORMATS: dict[PlanFormat, _Document | _FlightFile] = {
+    PlanFormat.GEOJSON: _Document(geojson, GEOJSON, "geojson"),
+    PlanFormat.CSV: _Document(csv_table, "text/csv; charset=utf-8", "csv"),
+    PlanFormat.HTML: _Document(printed_page, "text/html; charset=utf-8", "html"),
+    PlanFormat.QGC_PLAN: _FlightFile(plan_file, "application/json", "plan"),
+    PlanFormat.QGC_WPL: _FlightFile(waypoint_file, "text/plain; charset=utf-8", "waypoints"),
+}
+_ZIP = "application/zip"
+_TEXT = {"schema": {"type": "string"}}
+_OBJECT = {"schema": {"type": "object"}}
+
+
+@router.get(
+    "/{job_id}/plan",
+    summary="Take a plan away",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "The file; flight files of all UAVs that fly come as a ZIP archive",
+            "content": {
+                GEOJSON: _OBJECT,
+                "application/json": _OBJECT,
+                "text/plain": _TEXT,
+                "text/csv": _TEXT,
+                "text/html": _TEXT,
+                _ZIP: {"schema": {"type": "string", "format": "binary"}},
+            },
+            "headers": {
+                "Content-Disposition": {"description": "The file's name", "schema": {"type": "string"}}
+            },
+        },
+        **responses(
+            "job-not-found",
+            "uav-not-found",
+            "no-plan",
+            "nothing-to-fly",
+            "plan-not-geographic",
+            "plan-out-of-range",
+            "invalid-request",
+        ),
+    },
+)
+async def get_plan(
+    job_id: JobId,
+    services: Served,
+    format: Annotated[
+        PlanFormat,
+        Query(
+            description="geojson, csv, html (a page to print): the whole plan. "
+            "qgc-plan (QGroundControl's .plan), qgc-wpl (QGC WPL 110 waypoints): "
+            "flight files, one a UAV, for problems with crs wgs84"
+        ),
+    ],
+    uav: Annotated[
+        str | None,
+        Query(
+            min_length=1, max_length=100, description="Id of the UAV of a flight file; default: all that fly"
+        ),
+    ] = None,
+    altitude: Annotated[
+        float,
+        Query(
+            ge=mission.MIN_ALTITUDE_M,
+            le=mission.MAX_ALTITUDE_M,
+            allow_inf_nan=False,
+            description="Flight files: m",
+        ),
+    ] = 50.0,
+    altitude_reference: Annotated[
+        AltitudeReference, Query(description="Flight files: what the altitude is measured from")
+    ] = AltitudeReference.HOME,
+    delivery: Annotated[
+        Delivery,
+        Query(
+            description="Flight files: how material is left at a stop. "
+            "payload-place: MAV_CMD_NAV_PAYLOAD_PLACE; "
+            "servo: MAV_CMD_DO_SET_SERVO; gripper: MAV_CMD_DO_GRIPPER; land: land and take off again; "
+            "none: fly there"
+        ),
+    ] = Delivery.PAYLOAD_PLACE,
+    end: Annotated[
+        Ending, Query(description="Flight files: return to launch after the last stop, or land there")
+    ] = Ending.RETURN,
+    servo_channel: Annotated[
+        int, Query(ge=1, le=mission.MAX_SERVO_CHANNEL, description="With delivery=servo: the output")
+    ] = 9,
+    servo_pwm: Annotated[
+        int,
+        Query(
+            ge=mission.MIN_SERVO_PWM_US,
+            le=mission.MAX_SERVO_PWM_US,
+            description="With delivery=servo: pulse width that releases, µs",
+        ),
+    ] = 1900,
+    gripper: Annotated[
+        int, Query(ge=1, le=mission.MAX_GRIPPER, description="With delivery=gripper: which one")
+    ] = 1,
+    max_descent: Annotated[
+        float,
+        Query(
+            ge=0,
+            le=mission.MAX_DESCENT_M,
+            allow_inf_nan=False,
+            description="With delivery=payload-place: m it may go down to find the ground; 0: no limit",
+        ),
+    ] = 0.0,
+) -> Response:
+    """Write a plan in a format of the field.
+
+    Before a flight file is written, every position, altitude, speed and stay is checked against what the
+    format holds, and at every stop that the UAV is within its range; all that is wrong is listed. A UAV that
+    is on its way already (it has flown, or is not where it started) gets a mission without a take-off.
+    """
+    choices = FlightChoices(
+        altitude_m=altitude,
+        altitude_reference=altitude_reference,
+        delivery=delivery,
+        end=end,
+        servo_channel=servo_channel,
+        servo_pwm_us=servo_pwm,
+        gripper=gripper,
+        max_descent_m=max_descent,
+    )
+    job = await services.jobs.get(job_id)
+    return await run_in_threadpool(_file, job, format, uav, choices)
+
+
+def _file(job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices) -> Response:
+    answer = result_of(job)
+    if answer is None or "routes" not in answer:
+        raise NoPlan(job.id, job.kind, job.status.value)
+    plan = flown_plan(problem_from_record(job.payload["problem"]), answer)
+    kind = _FORMATS[format]
+    if isinstance(kind, _Document):
+        # A page is looked at in the browser, everything else is kept.
+        how = "inline" if format is PlanFormat.HTML else "attachment"
+        return _response(kind.write(plan), kind.media_type, f"plan-{job.id[:8]}.{kind.ending}", how)
+    if plan.problem.crs != "wgs84":
+        raise NotGeographic(format.value, plan.problem.crs)
+    if uav is not None:
+        route = next((route for route in plan.routes if route.uav.id == uav), None)
+        if route is None:
+            raise UnknownUAV(uav)
+        if not route.flies:
+            raise NothingToFly(uav)
+        return _response(kind.write(route, choices), kind.media_type, file_name(route, kind.ending))
+    if not plan.flying:
+        raise NothingToFly(None)
+    files = {file_name(route, kind.ending): kind.write(route, choices) for route in plan.flying}
+    return _response(zip_archive(files), _ZIP, f"plan-{job.id[:8]}-{format}.zip")
+
+
+def _response(content: str | bytes, media_type: str, name: str, how: str = "attachment") -> Response:
+    return Response(
+        content, media_type=media_type, headers={"Content-Disposition": f'{how}; filename="{name}"'}
+    )
