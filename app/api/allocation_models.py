@@ -6,30 +6,40 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.problem_models import ProblemModel, WireModel
+from app.api.problem_models import ProblemModel, Whole, WireModel
+from app.solvers.registry import ALGORITHMS
 
-MAX_SEED = 2**63 - 1
+MAX_SEED = 2**53 - 1
+"""Beyond it not every reader of JSON gets the same integer (RFC 7493)."""
 MAX_TIME_LIMIT_S = 7 * 24 * 3600.0
 
 
 class TrainingModel(WireModel):
     """What to learn with."""
 
-    algorithm: str = Field(default="qmix", description="An algorithm that learns, see `GET /algorithms`")
+    algorithm: str = Field(
+        default="qmix",
+        description="An algorithm that learns, see `GET /algorithms`",
+        json_schema_extra={"enum": [each.name for each in ALGORITHMS.values() if each.learns]},
+    )
     parameters: dict[str, Any] = Field(
         default_factory=dict, description="The algorithm's own; the others keep their defaults"
     )
-    seed: int = Field(default=123, ge=0, le=MAX_SEED, description="Source of all randomness")
+    seed: Whole = Field(default=123, ge=0, le=MAX_SEED, description="Source of all randomness")
 
 
 class AllocationRequest(ProblemModel):
     """A problem, and how to solve it."""
 
-    algorithm: str = Field(default="transfer_qmix", description="See `GET /algorithms`")
+    algorithm: str = Field(
+        default="transfer_qmix",
+        description="See `GET /algorithms`",
+        json_schema_extra={"enum": list(ALGORITHMS)},
+    )
     parameters: dict[str, Any] = Field(
         default_factory=dict, description="The algorithm's own; the others keep their defaults"
     )
-    seed: int = Field(
+    seed: Whole = Field(
         default=123,
         ge=0,
         le=MAX_SEED,

@@ -105,11 +105,11 @@ def _http_error(request: Request, error: Exception) -> Response:
 
 def _methods_at(request: Request) -> list[str]:
     """List the methods of a place; the router names those of one route only, where several share it."""
-    methods: set[str] = set()
-    for template, operations in request.app.openapi()["paths"].items():
-        if compile_path(template)[0].match(request.url.path):
-            methods |= {method.upper() for method in operations}
-    return sorted(methods)
+    paths = request.app.openapi()["paths"]
+    # A path that is spelled out is another place than those whose template it fits too.
+    path = request.url.path
+    templates = [path] if path in paths else [each for each in paths if compile_path(each)[0].match(path)]
+    return sorted({method.upper() for template in templates for method in paths[template]})
 
 
 def _request_error(request: Request, error: Exception) -> Response:

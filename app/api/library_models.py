@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag
 
 from app.api.allocation_models import AnswerModel, TrainingModel
 from app.api.error_handlers import FORM_TAG
-from app.api.problem_models import ProblemModel, WireModel
+from app.api.problem_models import ProblemModel, Whole, WireModel
 from policy_store.policy import Neighbour, Policy, PolicyPage
 
 JOB_ID_PATTERN = "^[0-9a-f]{32}$"
@@ -77,7 +77,7 @@ class SimilarRequest(WireModel):
     """A new task."""
 
     task: ProblemModel = Field(description="The task to find similar source tasks for")
-    k: int = Field(default=5, ge=1, le=100, description="How many at most")
+    k: Whole = Field(default=5, ge=1, le=100, description="How many at most")
     similarity: Literal["summary", "paper"] = Field(
         default="summary",
         description="summary: by what the tasks have in common, whatever their sizes; paper: Algorithm 2, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from app.domain.errors import InvalidProblem, ProblemTooLarge, Violation
 from app.domain.problem import (
@@ -19,8 +19,15 @@ from app.domain.problem import (
 )
 from app.settings import Settings
 
+
+def _without_point(given: object) -> object:
+    return int(given) if isinstance(given, float) and given.is_integer() else given
+
+
 Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
 Amount = Annotated[float, Field(ge=0, le=MAX_MAGNITUDE)]
+Whole = Annotated[int, BeforeValidator(_without_point)]
+"""An integer as JSON Schema has it: 1.0 is one too, which is what some languages write."""
 Identifier = Annotated[str, Field(min_length=1, max_length=MAX_ID_LENGTH)]
 
 
@@ -45,7 +52,7 @@ class UAVModel(WireModel):
     )
     voyage: Amount = Field(description="Maximum range of one flight, in distance units, or km")
     dis: Amount = Field(default=0.0, description="Distance already flown")
-    ret: int = Field(default=0, ge=0, le=1, description="1 when it is returning: it gets no more tasks")
+    ret: Whole = Field(default=0, ge=0, le=1, description="1 when it is returning: it gets no more tasks")
     loadlist: list[Amount] = Field(min_length=1, description="Amounts carried, one a material")
 
 
@@ -83,7 +90,7 @@ class ProblemModel(WireModel):
 
     uavs: list[UAVModel] = Field(min_length=1, description="The swarm")
     targets: list[TargetModel] = Field(min_length=1, description="The rescue areas")
-    max_steps: int = Field(default=5, ge=1, le=MAX_STEPS, description="Most decision steps of a plan, S")
+    max_steps: Whole = Field(default=5, ge=1, le=MAX_STEPS, description="Most decision steps of a plan, S")
     crs: Literal["local", "wgs84"] = Field(
         default="local",
         description="local: x, y on a plane, Euclidean distances. wgs84: x longitude and y latitude in "

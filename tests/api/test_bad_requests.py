@@ -72,7 +72,7 @@ def refusal(response, status, kind):
         ("objective/distance_weight", -1, "/objective/distance_weight"),
         ("objective/charge_return", 1, "/objective/charge_return"),
         ("seed", -1, "/seed"),
-        ("seed", 2**63, "/seed"),
+        ("seed", 2**53, "/seed"),
         ("time_limit_s", 0, "/time_limit_s"),
         ("parameters", [], "/parameters"),
     ],

@@ -24,6 +24,16 @@ router = APIRouter(prefix="/jobs", tags=["jobs"])
 JobId = Annotated[
     str, Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32])
 ]
+_EVENT = {
+    "description": "One event",
+    "type": "object",
+    "properties": {
+        "id": {"type": "string", "pattern": "^[0-9]+$", "description": "For `Last-Event-ID`"},
+        "event": {"type": "string", "enum": ["progress", "end"]},
+        "data": {"type": "string", "contentMediaType": "application/json"},
+    },
+    "required": ["id", "event", "data"],
+}
 _MAX_EVENT_ID_DIGITS = 18
 _FAREWELL_S = 2.0
 
@@ -62,7 +72,7 @@ async def get_job(job_id: JobId, services: Served) -> JobModel:
         200: {
             "description": "Server-sent events: `progress` with the fields of a job's progress, and one "
             "`end`, which has its `status` too",
-            "content": {"text/event-stream": {"schema": {"type": "string"}}},
+            "content": {"text/event-stream": {"schema": _EVENT}},
         },
         **responses("job-not-found", "invalid-request"),
     },
