@@ -122,6 +122,7 @@ def allocate(
             "parameters": parse_parameters(request.algorithm, request.parameters).model_dump(mode="json"),
             "seed": request.seed,
             "library_url": settings.resolved_database_url,
+            "threads": settings.threads_per_job,
         }
         with _library(settings) as (library, database):
             seed_library(library, database)

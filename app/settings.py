@@ -39,6 +39,14 @@ class Settings(BaseSettings):
         default=(), description="Origins whose pages may call the service, with commas between them"
     )
 
+    tile_url: str | None = Field(
+        default=None,
+        pattern=r"^https?://[A-Za-z0-9.{}:-]+/[^\s;,]*$",
+        description="Tile server of the dashboard's map, such as `https://tiles.example/{z}/{x}/{y}.png`; "
+        "default: none, a map without a background",
+    )
+    tile_attribution: str = Field(default="", description="Whom the map names as the source of its tiles")
+
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="What is logged at least: `debug`, `info`, `warning` or `error`"
     )
@@ -47,6 +55,12 @@ class Settings(BaseSettings):
         ge=1,
         le=256,
         description="Worker processes; default: one a processor",
+    )
+    threads_per_job: int = Field(
+        default=1,
+        ge=1,
+        le=256,
+        description="Cores that the search of one job keeps busy; workers times this: processors",
     )
     queue_limit: int = Field(
         default=64, ge=0, description="Jobs of a lane that may wait; one more is answered with 429"

@@ -4,37 +4,51 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
+import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib import import_module
 from typing import Any
 
-from app.domain.allocation import Allocation
+import numpy as np
+
 from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem, Target
-from app.domain.records import problem_from_record, problem_to_record
+from app.domain.records import problem_from_record, problem_to_record, to_record
+from app.jobs.answer_time import AnswerTime
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
+from app.simulation.arrays import compile_problem
 from app.simulation.explain import explain
+from app.simulation.generator import generate
 from app.solvers import protocol
+from app.solvers.greedy import greedy_plan
 from app.solvers.registry import create_solver, parse_parameters
 
 _VERIFY = "app.learning.checkpoint:verify"
 _WARM_UP_TRANSFER = "app.learning.universal.warm_up:warm_up"
 
-# What follows the search: explaining the plan, 0.2 µs a pair of UAV and target (measured at 1000x2000, here
-# twice that), storing the result and answering. Of a short time limit the search keeps most.
-_ANSWER_S = 0.03
-_ANSWER_S_A_PAIR = 4e-7
-_LARGEST_ANSWER_SHARE = 0.25
+_answer_time = AnswerTime()
+_SIZE_TIMED = (50, 100, 3)
+"""UAVs, areas and materials of the problem whose explanation is timed by the warm-up."""
 
 _WARM_UP_PARAMETERS: dict[str, dict[str, Any]] = {
     "greedy": {},
     "ga": {"num_total": 4, "iteration": 2},
     "local_search": {"moves": 200},
+    "auto": {"moves": 200, "policy": False},
     "dqn": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
-    "qmix": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
+    # In service mode nothing that the transfer's warm-up leaves out.
+    "qmix": {
+        "mode": "paper",
+        "n_epochs": 4,
+        "evaluate_per_epoch": 2,
+        "buffer_size": 2,
+        "batch_size": 2,
+        "learning_starts": 1,
+    },
 }
 
 
@@ -44,8 +58,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     Parameters
     ----------
     payload
-        ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, and ``library_url``, the database
-        with the source policies.
+        ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, ``library_url``, the database
+        with the source policies, and ``threads``, how many cores to keep busy.
     context
         Where progress goes. When it says stop, the best plan so far is the result.
 
@@ -63,15 +77,17 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     problem = problem_from_record(payload["problem"])
     algorithm, seed = payload["algorithm"], payload["seed"]
     parameters = parse_parameters(algorithm, payload["parameters"])
-    solver = create_solver(algorithm, parameters, protocol.SolverContext(payload["library_url"]))
+    # A job that was stored by an earlier version says nothing of threads.
+    solver_context = protocol.SolverContext(payload["library_url"], payload.get("threads", 1))
+    solver = create_solver(algorithm, parameters, solver_context)
     solution = solver.solve(problem, seed, _stop(problem, context), _report(context))
-    allocation = explain(problem, solution.plan)
+    answer = _explained(problem, solution.plan)
     source = solution.source_policy
     result = {
         "algorithm": algorithm,
         "parameters": solution.parameters.model_dump(mode="json"),
         "seed": seed,
-        **_answer(allocation),
+        **answer,
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
     }
@@ -140,12 +156,20 @@ def warm_up() -> None:
         if work.artifact is not None:
             _verify(work.artifact, problem)
     _named(_WARM_UP_TRANSFER)(problem)
+    compile_problem(replace(problem, crs="wgs84"))
+    # How long answers take here is known before the first one is asked for in a short time.
+    larger = generate("uniform", *_SIZE_TIMED, np.random.default_rng(0))
+    for _ in range(2):
+        _answer_time.forget()
+        _explained(larger, greedy_plan(larger))
 
 
-def _answer(allocation: Allocation) -> dict[str, Any]:
-    """Return an allocation by the field names of ``POST /allocate``."""
-    answer = asdict(allocation)
+def _explained(problem: Problem, plan: Plan) -> dict[str, Any]:
+    """Return an allocation by the field names of ``POST /allocate``, and note how long that took."""
+    begun = time.perf_counter()
+    answer: dict[str, Any] = to_record(explain(problem, plan))
     answer["assignment"] = answer.pop("plan")["assignment"]
+    _answer_time.took(problem, time.perf_counter() - begun)
     return answer
 
 
@@ -154,14 +178,21 @@ def _stop(problem: Problem, context: WorkContext) -> protocol.StopCriterion:
     left = context.time_left()
     if left is None:
         return context.cancelled
-    pairs = problem.n_uavs * problem.n_targets
-    reserve = min(_LARGEST_ANSWER_SHARE * left, _ANSWER_S + _ANSWER_S_A_PAIR * pairs)
+    return _StopInTime(context, _answer_time.kept_back(problem, left))
 
-    def stop() -> bool:
-        remaining = context.time_left()
-        return context.cancelled() or (remaining is not None and remaining <= reserve)
 
-    return stop
+class _StopInTime:
+    """A :class:`~app.solvers.protocol.StopCriterion` that tells a search how long it has."""
+
+    def __init__(self, context: WorkContext, reserve: float) -> None:
+        self._context, self._reserve = context, reserve
+
+    def __call__(self) -> bool:
+        return self._context.cancelled() or self.seconds_left() <= 0.0
+
+    def seconds_left(self) -> float:
+        left = self._context.time_left()
+        return math.inf if left is None else left - self._reserve
 
 
 def _report(context: WorkContext) -> Callable[[protocol.Progress], None]:

@@ -25,6 +25,9 @@ Without reference counts (``_nrt=False``, numba's own switch for such code) a ca
 arrays costs 6 ns instead of 340. Allocate in Python or in an ordinary ``njit`` function around it.
 """
 
+compiled_free: Callable[[Function], Function] = njit(nogil=True, **_OPTIONS)
+"""The same, and other threads run meanwhile: for the outermost function of long work."""
+
 TOLERANCE = 1e-6
 """Relative tolerance of the comparisons with range and deadline."""
 

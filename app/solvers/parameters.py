@@ -34,3 +34,13 @@ class LocalSearchParameters(Parameters):
         le=1_000_000,
         description="Rounds of cooling after the first; null: by size and moves",
     )
+
+
+class AutoParameters(LocalSearchParameters):
+    """What a request may fix instead of leaving it to `auto`."""
+
+    policy: bool | None = Field(
+        default=None,
+        description="Whether plans of the nearest policy of the library are among the starts; null: where "
+        "that pays, by size and time limit",
+    )

@@ -30,9 +30,12 @@ class SolverContext:
     ----------
     library_url
         Database of the policy library, or None where there is none.
+    threads
+        Cores it may keep busy, at least 1.
     """
 
     library_url: str | None = None
+    threads: int = 1
 
 
 @dataclass(frozen=True, slots=True)

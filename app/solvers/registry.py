@@ -82,6 +82,13 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "app.solvers.parameters:LocalSearchParameters",
         ),
         Algorithm(
+            "auto",
+            "The best plan in the time there is: local search from the best of several starts, the learned "
+            "policy's among them where that pays",
+            "app.learning.auto:Auto",
+            "app.solvers.parameters:AutoParameters",
+        ),
+        Algorithm(
             "greedy",
             "Every UAV in turn takes the visit that earns most at once; the yardstick",
             "app.solvers.greedy:Greedy",

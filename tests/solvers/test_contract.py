@@ -31,6 +31,7 @@ QUICK = {
     "dqn": LEARNING,
     "ga": {"num_total": 8, "iteration": 10},
     "local_search": {"moves": 3000, "restarts": 1},
+    "auto": {"moves": 3000, "restarts": 1, "policy": True},
 }
 SHAPES = ((2, 3, 2), (3, 4, 1))
 

@@ -24,7 +24,7 @@ from app.solvers.local_search.routes import USELESS
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import SolverContext
-from app.solvers.stop import never
+from app.solvers.stop import Deadline, never, seconds_left
 
 
 def quiet(*_told):
@@ -259,3 +259,52 @@ def test_moves_are_all_made_whatever_the_rounds():
     )
     assert told[-1] == (1.0, 7)
     assert told == sorted(told)
+
+
+def test_several_threads_give_the_same_plan_each_time_and_none_worse_than_its_start():
+    problem = generate("uniform", 6, 12, 2, np.random.default_rng(3))
+    context = SolverContext(threads=3)
+    parameters = LocalSearchParameters(moves=4000, restarts=2)
+    first, again = (LocalSearch(parameters, context).solve(problem, 5, never, quiet) for _ in range(2))
+    assert (first.plan, first.history) == (again.plan, again.history)
+    assert first.history.epoch == [0, 1, 2, 3]
+    assert first.history.reward == sorted(first.history.reward)
+    assert replay(problem_to_record(problem), first.plan.assignment)["reward"] == pytest.approx(
+        first.history.reward[-1], abs=1e-9
+    )
+
+
+class Clock:
+    """Time passes by being looked at."""
+
+    def __init__(self, step):
+        self.now, self.step = 0.0, step
+
+    def __call__(self):
+        self.now += self.step
+        return self.now
+
+
+def test_a_search_is_cold_when_its_time_is_up(monkeypatch):
+    problem = generate("uniform", 6, 12, 2, np.random.default_rng(3))
+    clock, temperatures = Clock(0.001), []
+    monkeypatch.setattr("app.solvers.local_search.improvement.time.monotonic", clock)
+
+    def note(_search, _rng, _moves, hot, cold, _penalty):
+        temperatures.append((hot, cold))
+
+    monkeypatch.setattr("app.solvers.local_search.improvement.anneal", note)
+    told = []
+    solve(problem, stop=Deadline(0.4, clock), report=told.append)
+    cooling, scale = Cooling(), max(target.level for target in problem.targets)
+    assert temperatures[0][0] == pytest.approx(cooling.hot * scale, rel=0.1)
+    assert temperatures[-1][1] == pytest.approx(cooling.cold * scale, rel=0.1)
+    assert [progress.fraction for progress in told] == sorted(progress.fraction for progress in told)
+    assert told[-1].fraction == 1.0
+
+
+def test_who_has_no_time_limit_says_nothing_of_time():
+    assert seconds_left(never) is None
+    assert seconds_left(lambda: False) is None
+    assert seconds_left(Deadline(float("inf"))) is None
+    assert seconds_left(Deadline(5, lambda: 1.0)) == 5.0

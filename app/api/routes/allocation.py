@@ -76,7 +76,8 @@ async def allocate(
     }
     job, _ = await services.jobs.submit(
         ALLOCATE,
-        payload,
+        # Not part of what makes a request the same: an operator may change it between two tries.
+        payload | {"threads": services.settings.threads_per_job},
         time_limit_s=body.time_limit_s,
         idempotency=idempotency(idempotency_key, ALLOCATE, payload, body.time_limit_s),
     )

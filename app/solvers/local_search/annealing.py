@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled
+from app.simulation.simulator import compiled, compiled_free
 from app.solvers.local_search.change import Change, apply, extra_distance, feasible, new_change, propose, undo
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
 from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
@@ -40,21 +40,23 @@ class Search(NamedTuple):
 
 def new_search(arrays: ProblemArrays) -> Search:
     """Begin a search from the plan in which nobody flies."""
+    return _begin(arrays, neighbourhood(arrays))
+
+
+def replica(search: Search) -> Search:
+    """Begin another search of the same problem from the incumbent of one, for another thread."""
+    other = _begin(search.arrays, search.near)
+    set_routes(other, actions_of(search))
+    return other
+
+
+def _begin(arrays: ProblemArrays, near: Neighbourhood) -> Search:
     routes = empty_routes(arrays)
-    search = Search(
-        arrays,
-        neighbourhood(arrays),
-        routes,
-        new_change(arrays),
-        routes.target.copy(),
-        routes.length.copy(),
-        np.zeros(1),
-    )
     if arrays.charge_return[0]:
         at_home = arrays.start_home[0][~arrays.ret[0]]
         routes.total[DISTANCE] = at_home.sum()
-    search.best[0] = -arrays.weight[0] * routes.total[DISTANCE]
-    return search
+    best = np.array([-arrays.weight[0] * routes.total[DISTANCE]])
+    return Search(arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best)
 
 
 def set_routes(search: Search, actions: Integers) -> None:
@@ -135,7 +137,7 @@ def drop_useless(search: Search) -> None:
     keep_best(search)
 
 
-@compiled
+@compiled_free
 def anneal(
     search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float
 ) -> int:

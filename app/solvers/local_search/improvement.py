@@ -1,19 +1,27 @@
-"""Rounds of annealing in pieces: as many moves as were asked for, unless a stop criterion ends it early."""
+"""Rounds of annealing in pieces: as many moves as were asked for, or as time allows, on any number of cores.
+
+Where the stop criterion says how long it leaves, the temperature falls with the time, so that a search is
+cold when its time is up, however fast the machine is. Without a time limit it falls with the moves alone, and
+the same generators give the same plans.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
 
 from app.simulation.arrays import ProblemArrays
-from app.solvers.local_search.annealing import Search, anneal, drop_useless
-from app.solvers.local_search.effort import move_cost
+from app.solvers.local_search.annealing import Search, actions_of, anneal, drop_useless, set_routes
+from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
+from app.solvers.stop import seconds_left
 
-_PIECE = 6000
-"""Moves between two looks at the stop criterion times what a move costs: about 2 ms."""
+_PIECE_S = 0.002
+"""Seconds between two looks at the stop criterion, about."""
 
 _TOLD = 32
 """Times that progress is told, beside the ends of the rounds."""
@@ -30,13 +38,28 @@ class Cooling(NamedTuple):
         What a visit that unloads nothing costs during the search.
     """
 
-    hot: float = 0.1
+    hot: float = 0.05
     cold: float = 0.002
     penalty: float = 0.03
 
 
+class _Span(NamedTuple):
+    """What a round may take: moves, and the seconds on :func:`time.monotonic` from when to when."""
+
+    moves: int
+    begin: float
+    end: float
+
+    def share(self, done: int) -> float:
+        """Return how much of it is over, by moves or by time, whichever is further."""
+        by_moves = done / self.moves
+        if self.end == np.inf:
+            return by_moves
+        return max(by_moves, (time.monotonic() - self.begin) / max(self.end - self.begin, 1e-9))
+
+
 Watch = Callable[[float, int], None]
-"""Takes the share of the moves done and the number of rounds ended."""
+"""Takes the share of the work done and the number of rounds ended."""
 
 
 def improve(
@@ -48,58 +71,111 @@ def improve(
     stop: StopCriterion,
     watch: Watch,
 ) -> None:
-    """Anneal from the search's current plan, each round from where the one before ended.
+    """Anneal on one core; see :func:`improve_together`."""
+    improve_together([search], [rng], moves, rounds, cooling, stop, watch)
+
+
+def improve_together(
+    searches: Sequence[Search],
+    generators: Sequence[np.random.Generator],
+    moves: int,
+    rounds: int,
+    cooling: Cooling,
+    stop: StopCriterion,
+    watch: Watch,
+) -> None:
+    """Anneal from the searches' current plans, a thread each; after a round all go on from the best plan.
 
     Parameters
     ----------
-    search
-        Changed; its incumbent is the best plan of all rounds and of before.
-    rng
-        The only source of randomness.
+    searches
+        Of one problem, at least one. Changed: the incumbent of the first is the best plan of all searches, of
+        all rounds and of before.
+    generators
+        The only source of randomness, one a search.
     moves, rounds
-        How many moves to try, over all rounds, at least 1.
+        How many moves each search tries, over all rounds, at least 1. Where less time is left than they
+        would take, there are fewer rounds in proportion.
     cooling
         Temperatures.
     stop
-        Asked every few milliseconds. It does not change what the moves before it were.
+        Asked every few milliseconds. Unless it has a time limit, it does not change what the moves before it
+        were.
     watch
         Told now and then, and after each round.
     """
-    for number in range(rounds):
-        before, after = moves * number // rounds, moves * (number + 1) // rounds
+    first = searches[0]
+    begin, left = time.monotonic(), seconds_left(stop)
+    if left is not None:
+        possible = left * moves_a_second(first.arrays)
+        rounds = rounds_for(rounds, possible / max(moves, 1))
+    idle = not (len(first.near.active) and len(first.near.wanted))
+    with ThreadPoolExecutor(max(1, len(searches) - 1)) as threads:
+        for number in range(rounds):
+            if stop():
+                break
+            before, after = moves * number // rounds, moves * (number + 1) // rounds
+            if after > before and not idle:
+                now, end = time.monotonic(), np.inf
+                if left is not None:
+                    end = begin + left * (number + 1) / rounds
+                span = _Span(after - before, now, end)
 
-        def tell(done: int, before: int = before, number: int = number) -> None:
-            watch((before + done) / moves, number)
+                def tell(share: float, number: int = number) -> None:
+                    watch((number + share) / rounds, number)
 
-        if stop():
-            return
-        if len(search.near.active) and len(search.near.wanted):
-            _round(search, rng, after - before, -(-moves // _TOLD), cooling, stop, tell)
-        watch(after / max(moves, 1), number + 1)
+                others = [
+                    threads.submit(_round, search, rng, span, cooling, stop, _silent)
+                    for search, rng in zip(searches[1:], generators[1:], strict=True)
+                ]
+                _round(first, generators[0], span, cooling, stop, tell)
+                for other in others:
+                    other.result()
+                _share_best(searches)
+            watch((number + 1) / rounds, number + 1)
 
 
 def _round(
     search: Search,
     rng: np.random.Generator,
-    moves: int,
-    tell_every: int,
+    span: _Span,
     cooling: Cooling,
     stop: StopCriterion,
-    tell: Callable[[int], None],
+    tell: Callable[[float], None],
 ) -> None:
-    """One round; the plan at its end is made legal."""
+    """One round of one search; the plan at its end is made legal."""
     scale = _level_scale(search.arrays)
-    piece = max(100, round(_PIECE / move_cost(search.arrays)))
-    done, told = 0, 0
-    while done < moves and not stop():
-        following = min(done + piece, moves)
-        hot, cold = (cooling.hot * (cooling.cold / cooling.hot) ** (n / moves) for n in (done, following))
-        anneal(search, rng, following - done, hot * scale, cold * scale, cooling.penalty * scale)
-        done = following
-        if done - told >= tell_every:
-            told = done
-            tell(done)
+    piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
+    ratio = cooling.cold / cooling.hot
+    done, share, told = 0, span.share(0), 0.0
+    step = piece / span.moves
+    while done < span.moves and share < 1.0 and not stop():
+        count = min(piece, span.moves - done)
+        hot, cold = (cooling.hot * ratio**part for part in (share, min(share + step, 1.0)))
+        anneal(search, rng, count, hot * scale, cold * scale, cooling.penalty * scale)
+        done += count
+        now = span.share(done)
+        # The next piece is expected to bring it as far as this one did.
+        share, step = now, max(now - share, count / span.moves)
+        if share - told >= 1.0 / _TOLD:
+            told = share
+            tell(min(share, 1.0))
     drop_useless(search)
+
+
+def _share_best(searches: Sequence[Search]) -> None:
+    """Let every search go on from the best incumbent; of equals the first one's."""
+    if len(searches) == 1:
+        return
+    best = max(searches, key=lambda search: float(search.best[0]))
+    actions = actions_of(best)
+    for search in searches:
+        if search is not best and search.best[0] < best.best[0]:
+            set_routes(search, actions)
+
+
+def _silent(_share: float) -> None:
+    """Only the first search tells how far it is."""
 
 
 def _level_scale(arrays: ProblemArrays) -> float:

@@ -8,40 +8,72 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays, compile_problem
 from app.solvers.greedy import greedy_plan
-from app.solvers.local_search.annealing import actions_of, new_search, set_routes
-from app.solvers.local_search.effort import default_moves, default_restarts
-from app.solvers.local_search.improvement import Cooling, improve
+from app.solvers.local_search.annealing import Search, actions_of, new_search, replica, set_routes
+from app.solvers.local_search.effort import default_moves, default_restarts, moves_within_limit
+from app.solvers.local_search.improvement import Cooling, Watch, improve_together
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
+from app.solvers.stop import seconds_left
 
 
 class LocalSearch:
     """A :class:`~app.solvers.protocol.Solver`; an epoch of its history is a round of annealing."""
 
-    def __init__(self, parameters: LocalSearchParameters, context: SolverContext) -> None:  # noqa: ARG002
+    def __init__(self, parameters: LocalSearchParameters, context: SolverContext) -> None:
         self.parameters = parameters
+        self._threads = context.threads
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the greedy rule's plan."""
         arrays = compile_problem(problem)
-        parameters, moves, rounds = self._filled_in(arrays)
-        rng = np.random.default_rng([abs(seed), int(seed < 0)])
+        moves, restarts = how_long(arrays, self.parameters.moves, self.parameters.restarts, stop)
         search, history = new_search(arrays), History()
         set_routes(search, greedy_plan(problem).as_array())
         history.add(0, float(search.best[0]))
+        watch = watching(search, history, report)
+        search_on(search, seed, self._threads, moves, restarts + 1, stop, watch)
+        used = self.parameters.model_copy(update={"moves": moves, "restarts": restarts})
+        return Solution(Plan.of(actions_of(search), problem.n_targets), history, used)
 
-        def watch(done: float, ended: int) -> None:
-            reward = float(search.best[0])
-            if ended > history.epoch[-1]:
-                history.add(ended, reward)
-            report(Progress(done, ended, reward, Plan.of(actions_of(search), problem.n_targets)))
 
-        improve(search, rng, moves, rounds, Cooling(), stop, watch)
-        return Solution(Plan.of(actions_of(search), problem.n_targets), history, parameters)
+def how_long(
+    arrays: ProblemArrays, moves: int | None, restarts: int | None, stop: StopCriterion
+) -> tuple[int, int]:
+    """Fill in the moves and the restarts that a request leaves open."""
+    if moves is None:
+        moves = default_moves(arrays) if seconds_left(stop) is None else moves_within_limit(arrays)
+    return moves, default_restarts(arrays, moves) if restarts is None else restarts
 
-    def _filled_in(self, arrays: ProblemArrays) -> tuple[LocalSearchParameters, int, int]:
-        """Fill in what a request leaves open; also return the moves and the number of rounds."""
-        given = self.parameters
-        moves = default_moves(arrays) if given.moves is None else given.moves
-        restarts = default_restarts(arrays, moves) if given.restarts is None else given.restarts
-        return given.model_copy(update={"moves": moves, "restarts": restarts}), moves, restarts + 1
+
+def search_on(
+    search: Search,
+    seed: int,
+    threads: int,
+    moves: int,
+    rounds: int,
+    stop: StopCriterion,
+    watch: Watch,
+) -> None:
+    """Search from a current plan on some threads, each with the moves and a stream of random numbers.
+
+    The same seed and number of threads give the same plan as long as `stop` does not end it early.
+    """
+    streams = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(threads)
+    searches = [search, *(replica(search) for _ in range(threads - 1))]
+    generators = [np.random.default_rng(stream) for stream in streams]
+    improve_together(searches, generators, moves, rounds, Cooling(), stop, watch)
+
+
+def watching(search: Search, history: History, report: Report, begin: float = 0.0) -> Watch:
+    """Return a watch that reports and keeps the history, where `begin` of the work was done before."""
+    known: list[tuple[float, Plan]] = []
+
+    def watch(done: float, ended: int) -> None:
+        reward = float(search.best[0])
+        if ended > history.epoch[-1]:
+            history.add(ended, reward)
+        if not known or known[-1][0] != reward:
+            known[:] = [(reward, Plan.of(actions_of(search), search.arrays.shape[1]))]
+        report(Progress(begin + (1.0 - begin) * done, ended, reward, known[0][1]))
+
+    return watch
