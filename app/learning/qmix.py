@@ -1,4 +1,4 @@
-"""QMIX from scratch (Algorithm 1)."""
+"""QMIX from scratch: Algorithm 1, or in service mode :mod:`app.learning.universal.scratch`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from app.learning.random_streams import RandomStreams, random_streams
 from app.learning.replay_buffer import ReplayBuffer
 from app.learning.threads import one_thread
 from app.learning.trainer import Incumbent, Trainer, Training
+from app.learning.universal.scratch import UniversalScratch, fits
+from app.simulation.arrays import compile_problem
 from app.solvers.protocol import Report, Solution, SolverContext, StopCriterion
 
 MAX_TRAINING_BYTES = 2**30
@@ -121,12 +123,20 @@ class Qmix:
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """Train on the problem and return the best plan seen; see :class:`~app.solvers.protocol.Solver`.
 
+        In service mode problems whose episodes are too long to learn from at once are left to Algorithm 1;
+        the solution's parameters say so by their mode.
+
         Raises
         ------
         ProblemTooLarge
             If training would not fit into memory.
         """
         parameters = self._parameters
+        if parameters.mode == "service":
+            if fits(compile_problem(problem)):
+                with one_thread():
+                    return UniversalScratch(problem, parameters, seed, stop, report).run()
+            parameters = parameters.model_copy(update={"mode": "paper"})
         config = qmix_config(problem, parameters)
         require_memory(parameters, config.sizes, problem.max_steps, parameters.drqn_hidden_dim)
         streams = random_streams(seed)

@@ -21,7 +21,7 @@ TASK = {
     ],
     "objective": {"distance_weight": 1.0},
 }
-QUICK = {"n_epochs": 12, "buffer_size": 4, "batch_size": 4, "evaluate_per_epoch": 4}
+QUICK = {"mode": "paper", "n_epochs": 12, "buffer_size": 4, "batch_size": 4, "evaluate_per_epoch": 4}
 ASYNC = {"Prefer": "respond-async"}
 
 

@@ -83,7 +83,8 @@ def test_time_that_is_up_stops_it():
 
 
 def test_training_is_registered_by_its_checkpoint():
-    trained = work.train(payload("qmix", QMIX), WorkContext.in_process(lambda _progress: None))
+    paper = payload("qmix", {**QMIX, "mode": "paper"})
+    trained = work.train(paper, WorkContext.in_process(lambda _progress: None))
     context = WorkContext.in_process(lambda _progress: None)
     text = base64.b64encode(trained.artifact).decode()
     done = work.register({"name": "x", "problem": record(), "checkpoint_base64": text}, context)

@@ -38,7 +38,7 @@ FIRST_UPDATE = 32
 def epoch_times(problem):
     """Milliseconds of every epoch with an update."""
     moments = []
-    parameters = QmixParameters(n_epochs=EPOCHS, learning_starts=FIRST_UPDATE)
+    parameters = QmixParameters(mode="paper", n_epochs=EPOCHS, learning_starts=FIRST_UPDATE)
     solver = Qmix(parameters, SolverContext())
     solver.solve(problem, 123, never, lambda progress: moments.append(time.perf_counter()))
     return 1e3 * np.diff(moments)[FIRST_UPDATE:]
@@ -59,7 +59,7 @@ def fill(library):
     """One untrained source policy of each size: what it has learned does not matter to the clock."""
     for m, n, k in SIZES:
         task = generate("uniform", m, n, k, np.random.default_rng(1))
-        solver = Qmix(QmixParameters(n_epochs=0), SolverContext())
+        solver = Qmix(QmixParameters(mode="paper", n_epochs=0), SolverContext())
         checkpoint = solver.solve(task, 1, never, lambda progress: None).checkpoint
         library.add(new_policy(f"{m}x{n}", task, checkpoint))
 

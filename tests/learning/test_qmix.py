@@ -21,7 +21,7 @@ from app.solvers.stop import never
 
 
 def solve(problem, seed=1, stop=never, **parameters):
-    solver = Qmix(QmixParameters(**parameters), SolverContext())
+    solver = Qmix(QmixParameters(mode="paper", **parameters), SolverContext())
     return solver.solve(problem, seed, stop, lambda progress: None)
 
 
@@ -61,7 +61,7 @@ def test_stop_from_the_beginning_returns_a_legal_plan_at_once():
 
 
 def test_registry_builds_it():
-    parameters = QmixParameters(n_epochs=2)
+    parameters = QmixParameters(mode="paper", n_epochs=2)
     solution = create_solver("qmix", parameters, SolverContext()).solve(
         generate("uniform", 2, 2, 1, np.random.default_rng(0)), 1, never, lambda progress: None
     )
@@ -84,7 +84,8 @@ from app.learning.qmix import Qmix
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
 problem = generate("uniform", 4, 6, 3, np.random.default_rng(5))
-solution = Qmix(QmixParameters(n_epochs=60, learning_starts=20, evaluate_per_epoch=5), SolverContext()).solve(
+solution = Qmix(QmixParameters(
+    mode="paper", n_epochs=60, learning_starts=20, evaluate_per_epoch=5), SolverContext()).solve(
     problem, 123, lambda: False, lambda progress: None)
 print(solution.plan.assignment, solution.history, hashlib.sha256(solution.checkpoint).hexdigest())
 """
@@ -104,7 +105,7 @@ def test_same_seed_gives_the_same_bytes_in_another_process():
 
 
 def test_seed_decides_and_nothing_that_was_solved_before(problem):
-    solver = Qmix(QmixParameters(n_epochs=20, learning_starts=5), SolverContext())
+    solver = Qmix(QmixParameters(mode="paper", n_epochs=20, learning_starts=5), SolverContext())
     first, again, other = (solver.solve(problem, seed, never, lambda progress: None) for seed in (9, 9, 10))
     assert first == again
     assert first.checkpoint != other.checkpoint

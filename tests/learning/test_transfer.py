@@ -27,7 +27,13 @@ def task(seed, sizes=(3, 5, 2)):
 
 
 def trained(problem, seed=0, **parameters):
-    defaults = {"n_epochs": 40, "learning_starts": 10, "drqn_hidden_dim": 16, "qmix_hidden_dim": 8}
+    defaults = {
+        "mode": "paper",
+        "n_epochs": 40,
+        "learning_starts": 10,
+        "drqn_hidden_dim": 16,
+        "qmix_hidden_dim": 8,
+    }
     solver = Qmix(QmixParameters(**{**defaults, **parameters}), SolverContext())
     return solver.solve(problem, seed, never, lambda progress: None).checkpoint
 

@@ -23,9 +23,11 @@ from policy_store.database import Database
 from policy_store.library import PolicyLibrary
 
 SERVICE = "transfer_qmix in service mode"
+SCRATCH = "qmix in service mode"
 LEARNING = {"n_epochs": 12, "evaluate_per_epoch": 3, "buffer_size": 4, "batch_size": 4}
 QUICK = {
     SERVICE: {"mode": "service", "samples": 3, "n_epochs": 2, "polish": True, "polish_moves": 1000},
+    SCRATCH: {"mode": "service", "n_epochs": 12, "batch_size": 4, "evaluate_per_epoch": 4},
     "transfer_qmix": {**LEARNING, "mode": "paper"},
     "qmix": {**LEARNING, "mode": "paper"},
     "dqn": LEARNING,
@@ -82,7 +84,7 @@ def for_every_size(task):
 
 def quick(name):
     """Parameters with which an algorithm is quick, and its name in the registry."""
-    algorithm = "transfer_qmix" if name == SERVICE else name
+    algorithm = {SERVICE: "transfer_qmix", SCRATCH: "qmix"}.get(name, name)
     return algorithm, parse_parameters(algorithm, QUICK.get(name, {}))
 
 
@@ -90,7 +92,7 @@ def solve(name, problem, context, stop=never, report=lambda progress: None, seed
     return create_solver(*quick(name), context).solve(problem, seed, stop, report)
 
 
-every_algorithm = pytest.mark.parametrize("name", [*ALGORITHMS, SERVICE])
+every_algorithm = pytest.mark.parametrize("name", [*ALGORITHMS, SERVICE, SCRATCH])
 
 
 @every_algorithm

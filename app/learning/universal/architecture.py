@@ -20,7 +20,10 @@ DISTANCE_FEATURES = 5
 HEADS = 4
 """Attention heads a layer; the width is a multiple of it."""
 
-_LARGEST = {"width": 512, "layers": 8, "qmix_hidden_dim": 1024}
+WIDEST = 512
+"""Largest width that is taken."""
+
+_LARGEST = {"width": WIDEST, "layers": 8, "qmix_hidden_dim": 1024}
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from app.learning.universal.unfolding import unfold
 from app.simulation.arrays import Integers, ProblemArrays, stack
 from app.solvers.protocol import StopCriterion
 
-_TURN_TOKENS = 4000
+TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
 
 MAX_BYTES = 2**30
@@ -73,24 +73,35 @@ class FineTuning:
         self._arrays, self._rng = arrays, rng
         m, n, _ = arrays.shape
         tokens = m * int(arrays.max_steps[0]) * (n + 1)
-        self._episodes = batch_of(arrays, max(1, min(batch_size, _TURN_TOKENS // tokens)))
+        self._episodes = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
         self._learner = Learner(self.policy.agent, self.policy.mixer, lr=lr, td_weight=0.2, gamma=gamma)
 
-    def epoch(self, best: Integers, stop: StopCriterion) -> Integers:
+    @property
+    def episodes(self) -> int:
+        """Episodes an epoch plays."""
+        return self._episodes
+
+    def epoch(
+        self, best: Integers, stop: StopCriterion, episodes: int | None = None, temperature: float = 1.0
+    ) -> Integers:
         """Play some episodes and learn from them and from the best plan; return the plans (B, S, M).
 
         Parameters
         ----------
         best
-            (S, M) the best plan there is; it flies somewhere.
+            (S, M) the best plan there is; one that flies nowhere is not learned from.
         stop
             Once it is true nothing more is learned.
+        episodes
+            How many, at most :attr:`episodes`, which it is where None.
+        temperature
+            At which their actions are drawn.
         """
-        problem = np.zeros(self._episodes, np.int64)
-        plans = play(self.policy.agent, self._arrays, problem, self._rng, stop=stop).plans
+        problem = np.zeros(episodes or self._episodes, np.int64)
+        plans = play(self.policy.agent, self._arrays, problem, self._rng, temperature, stop).plans
         if not stop():
             self._learn(plans, imitate=False)
-        if not stop():
+        if (best < self._arrays.shape[1]).any() and not stop():
             self._learn(best[None], imitate=True)
         return plans
 

@@ -41,7 +41,9 @@ class UniversalPolicy(nn.Module):
     @classmethod
     def of_seed(cls, config: UniversalConfig, seed: int) -> UniversalPolicy:
         """Make a policy with random weights that depend on the seed alone."""
-        policy = cls(config)
+        # Building it draws numbers too, from where everybody else does.
+        with torch.random.fork_rng(devices=[]):
+            policy = cls(config)
         policy.agent, policy.mixer = initial(config, seed)
         return policy
 

@@ -66,7 +66,7 @@ def store(tmp_path_factory, policies):
         task = source_task(family)
         library.add(new_policy(family, task, checkpoint(policy, task), policy_id=family))
     task = generate("uniform", 3, 5, 2, np.random.default_rng(21))
-    parameters = QmixParameters(n_epochs=30, learning_starts=10)
+    parameters = QmixParameters(mode="paper", n_epochs=30, learning_starts=10)
     learned = Qmix(parameters, SolverContext()).solve(task, 1, never, lambda _progress: None).checkpoint
     library.add(new_policy("one size", task, learned, policy_id="one-size"))
     yield database.url
