@@ -83,6 +83,11 @@ class ObjectiveModel(WireModel):
         default=True, description="A visit is allowed only if the UAV can still fly home"
     )
     charge_return: bool = Field(default=False, description="The leg home costs reward too")
+    unloading: Literal["greedy", "planned"] = Field(
+        default="greedy",
+        description="greedy: a visit unloads all that is needed and carried, the paper's rule. planned: how "
+        "much it unloads is decided with the plan, so that a UAV can keep material for a more urgent area",
+    )
 
 
 class ProblemModel(WireModel):

@@ -16,6 +16,7 @@ from app.domain.errors import InvalidProblem, Violation
 from app.domain.geometry import distance
 
 Crs = Literal["local", "wgs84"]
+Unloading = Literal["greedy", "planned"]
 
 MAX_STEPS = 100
 """Largest number of decision steps a problem may ask for."""
@@ -107,11 +108,15 @@ class Objective:
         A visit is allowed only if the UAV can still fly home.
     charge_return
         The leg home costs reward too.
+    unloading
+        ``"greedy"``: a visit unloads all that is needed and carried, the paper's rule. ``"planned"``: how
+        much it unloads is decided with the plan.
     """
 
     distance_weight: float | None = None
     return_to_base: bool = True
     charge_return: bool = False
+    unloading: Unloading = "greedy"
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,10 @@ def _violations(problem: Problem) -> Iterator[Violation]:
         yield Violation("/max_steps", f"{problem.max_steps} is not in 1..{MAX_STEPS}")
     if problem.crs not in ("local", "wgs84"):
         yield Violation("/crs", f"{problem.crs!r} is neither 'local' nor 'wgs84'")
+    if problem.objective.unloading not in ("greedy", "planned"):
+        yield Violation(
+            "/objective/unloading", f"{problem.objective.unloading!r} is neither 'greedy' nor 'planned'"
+        )
     weight = problem.objective.distance_weight
     if weight is not None:
         yield from _number("/objective/distance_weight", weight, low=0.0)

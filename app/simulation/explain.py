@@ -10,11 +10,12 @@ from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation import simulator
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
+from app.simulation.unloading import best_deliveries
 from app.simulation.unmet import unmet_targets
 
 
 def rewards_of(arrays: ProblemArrays, plans: Actions) -> simulator.Replay:
-    """Replay plans of the first problem of a stack.
+    """Replay plans of the first problem of a stack, with greedy unloading.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ def rewards_of(arrays: ProblemArrays, plans: Actions) -> simulator.Replay:
 
 
 def reward_of(problem: Problem, plan: Plan) -> float:
-    """Compute the reward of a plan.
+    """Compute the reward of a plan; with planned unloading, that of its best deliveries.
 
     Raises
     ------
@@ -35,13 +36,14 @@ def reward_of(problem: Problem, plan: Plan) -> float:
         If one of its actions is not allowed.
     """
     actions = plan.as_array()
-    result = rewards_of(compile_problem(problem), actions[None])
-    _refuse_illegal(problem, actions, result)
+    result, _ = _replayed(problem, compile_problem(problem), actions)
     return float(result.reward[0])
 
 
 def explain(problem: Problem, plan: Plan) -> Allocation:
     """Replay a plan and write down everything that follows from it.
+
+    With planned unloading the deliveries are the best ones for the plan's routes.
 
     Raises
     ------
@@ -50,16 +52,15 @@ def explain(problem: Problem, plan: Plan) -> Allocation:
     """
     arrays = compile_problem(problem)
     actions = plan.as_array()
-    result = rewards_of(arrays, actions[None])
-    _refuse_illegal(problem, actions, result)
+    result, given = _replayed(problem, arrays, actions)
 
     # Nobody is sent home in this replay: at its end every UAV is still at its last stop, which is where the
     # leg home begins and where one more visit would begin.
     episodes = simulator.new_episodes(arrays, 1)
     legs, arrivals = np.zeros(actions.shape), np.zeros(actions.shape)
-    delivered = np.zeros((*actions.shape, problem.n_materials))
+    delivered = np.zeros((*actions.shape, problem.n_materials)) if given is None else given
     return_legs = np.zeros(problem.n_uavs)
-    _trace(arrays, episodes, actions, legs, arrivals, delivered, return_legs)
+    _trace(arrays, episodes, actions, given is not None, legs, arrivals, delivered, return_legs)
     routes = []
     for i, uav in enumerate(problem.uavs):
         stops = tuple(
@@ -90,12 +91,16 @@ def _trace(
     arrays: ProblemArrays,
     episodes: simulator.Episodes,
     actions: Actions,
+    planned: bool,
     legs: Floats,
     arrivals: Floats,
     delivered: Floats,
     return_legs: Floats,
 ) -> None:
-    """Fly the visits of a legal plan, and write down every leg, arrival and delivery, then the legs home."""
+    """Fly the visits of a legal plan, and write down every leg and arrival, then the legs home.
+
+    Deliveries are written down too, unless they are planned: then `delivered` has them.
+    """
     for s in range(actions.shape[0]):
         for i in range(actions.shape[1]):
             j = actions[s, i]
@@ -103,11 +108,29 @@ def _trace(
                 continue
             legs[s, i] = simulator.leg_to(arrays, episodes, 0, i, j)
             arrivals[s, i] = episodes.clock[0, i] + legs[s, i] / arrays.speed[0, i]
+            if planned:
+                simulator.deliver(arrays, episodes, i, j, delivered, s)
+                continue
             for k in range(delivered.shape[2]):
                 delivered[s, i, k] = min(episodes.load[0, i, k], episodes.need[0, j, k])
             simulator.act(arrays, episodes, 0, i, j)
     for i in range(actions.shape[1]):
         return_legs[i] = simulator.leg_home(arrays, episodes, 0, i)
+
+
+def _replayed(
+    problem: Problem, arrays: ProblemArrays, actions: Actions
+) -> tuple[simulator.Replay, Floats | None]:
+    """Replay a plan by the problem's rule of unloading; also return the deliveries if they are planned."""
+    if problem.objective.unloading == "greedy":
+        result, delivered = rewards_of(arrays, actions[None]), None
+    else:
+        # Rows and actions are looked at here already, as the deliveries are worked out before the replay.
+        sound = len(actions) <= problem.max_steps and 0 <= actions.min() <= actions.max() <= problem.n_targets
+        delivered = best_deliveries(arrays, actions) if sound else np.zeros((*actions.shape, arrays.shape[2]))
+        result = simulator.replay_delivering(arrays, actions, delivered)
+    _refuse_illegal(problem, actions, result)
+    return result, delivered
 
 
 def _refuse_illegal(problem: Problem, actions: Actions, result: simulator.Replay) -> None:

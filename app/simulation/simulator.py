@@ -38,6 +38,7 @@ TOO_LATE = 3
 UNLOADS_NOTHING = 4
 NO_SUCH_ACTION = 5
 TOO_MANY_STEPS = 6
+TOO_MUCH = 7
 
 RULES = {
     RETURNING: "a returning UAV gets no more targets",
@@ -46,6 +47,7 @@ RULES = {
     UNLOADS_NOTHING: "it would unload nothing",
     NO_SUCH_ACTION: "there is no such action",
     TOO_MANY_STEPS: "the plan has more rows than max_steps",
+    TOO_MUCH: "it would unload more than the UAV carries or the area needs",
 }
 """What :func:`verdict` and :func:`replay` return for an action that is not allowed, in words."""
 
@@ -200,6 +202,12 @@ def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -
             break
     if not useful:
         return UNLOADS_NOTHING
+    return reach_verdict(arrays, episodes, b, i, j)
+
+
+@compiled
+def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> int:
+    """Range and deadline of rule 2: ``ALLOWED``, ``OUT_OF_RANGE`` or ``TOO_LATE``, whatever is unloaded."""
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
     reach = episodes.flown[b, i] + d
@@ -231,21 +239,36 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
             return 0.0
         episodes.distance[b] += d
         return -arrays.weight[p] * d
-    d = leg_to(arrays, episodes, b, i, action)
-    episodes.clock[b, i] += d / arrays.speed[p, i]
-    episodes.clock[b, i] += arrays.service[p, action]
-    episodes.flown[b, i] += d
-    episodes.at[b, i] = action
-    episodes.distance[b] += d
+    d = fly_to(arrays, episodes, b, i, action)
     earned = 0.0
     for k in range(episodes.load.shape[2]):
         unloaded = min(episodes.load[b, i, k], episodes.need[b, action, k])
         if unloaded > 0.0:
-            episodes.load[b, i, k] -= unloaded
-            episodes.need[b, action, k] -= unloaded
-            earned += arrays.level[p, action] * unloaded / arrays.need_total[p, action]
+            earned += unload(arrays, episodes, b, i, action, k, unloaded)
     episodes.satisfaction[b] += earned
     return earned - arrays.weight[p] * d
+
+
+@compiled
+def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
+    """Take UAV `i` to target `j` and through its service time (rules 1 and 3); return the leg's length."""
+    p = episodes.problem[b]
+    d = leg_to(arrays, episodes, b, i, j)
+    episodes.clock[b, i] += d / arrays.speed[p, i]
+    episodes.clock[b, i] += arrays.service[p, j]
+    episodes.flown[b, i] += d
+    episodes.at[b, i] = j
+    episodes.distance[b] += d
+    return d
+
+
+@compiled
+def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k: int, amount: float) -> float:
+    """Unload an amount of material `k`, and return what it earns (rules 4 and 5)."""
+    p = episodes.problem[b]
+    episodes.load[b, i, k] -= amount
+    episodes.need[b, j, k] -= amount
+    return arrays.level[p, j] * amount / arrays.need_total[p, j]
 
 
 @compiled
@@ -349,3 +372,97 @@ def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
         result.satisfaction[b], result.distance[b] = state.satisfaction[0], state.distance[0]
         result.reward[b] = state.satisfaction[0] - arrays.weight[problem[b]] * state.distance[0]
     return result
+
+
+@njit(cache=True, error_model="numpy")
+def replay_delivering(arrays: ProblemArrays, plan: Integers, delivered: Floats) -> Replay:
+    """Replay a plan of the first problem of a stack whose deliveries are given (section 3a).
+
+    Parameters
+    ----------
+    arrays
+        The stack of problems.
+    plan
+        (S, M) actions.
+    delivered
+        (S, M, K) what every visit unloads.
+    """
+    steps, m = plan.shape
+    n, k = arrays.need.shape[1], arrays.need.shape[2]
+    state = Episodes(
+        np.zeros(1, np.int64), np.empty((1, m), np.int64), np.empty((1, m)), np.empty((1, m)),
+        np.empty((1, m), np.bool_), np.empty((1, m, k)), np.empty((1, n, k)),
+        np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.bool_),
+    )  # fmt: skip
+    reset_one(arrays, state, 0)
+    result = Replay(
+        np.zeros(1),
+        np.zeros(1),
+        np.zeros(1),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+    )
+    rule = TOO_MANY_STEPS if steps > arrays.max_steps[0] else ALLOWED
+    s = 0
+    while rule == ALLOWED and s < steps:
+        for i in range(m):
+            action = plan[s, i]
+            if action < 0 or action > n:
+                rule = NO_SUCH_ACTION
+            elif action < n:
+                rule = delivery_verdict(arrays, state, i, action, delivered, s)
+            if rule != ALLOWED:
+                result.step[0], result.uav[0] = s, i
+                break
+            if action == n:
+                act(arrays, state, 0, i, n)
+            else:
+                deliver(arrays, state, i, action, delivered, s)
+        s += 1
+    if rule == ALLOWED:
+        for i in range(m):
+            act(arrays, state, 0, i, n)
+    result.rule[0] = rule
+    result.satisfaction[0], result.distance[0] = state.satisfaction[0], state.distance[0]
+    result.reward[0] = state.satisfaction[0] - arrays.weight[0] * state.distance[0]
+    return result
+
+
+@compiled
+def delivery_verdict(
+    arrays: ProblemArrays, episodes: Episodes, i: int, j: int, delivered: Floats, s: int
+) -> int:
+    """As :func:`verdict` for episode 0, where the visit of step `s` is to unload ``delivered[s, i]``."""
+    if episodes.ret[0, i]:
+        return RETURNING
+    useful = False
+    for k in range(delivered.shape[2]):
+        amount = delivered[s, i, k]
+        if not 0.0 <= amount <= (1.0 + TOLERANCE) * min(arrays.load[0, i, k], arrays.need[0, j, k]):
+            return TOO_MUCH
+        # Amounts that add up to all there is may exceed it by their rounding.
+        if (
+            amount > episodes.load[0, i, k] + TOLERANCE * arrays.load[0, i, k]
+            or amount > episodes.need[0, j, k] + TOLERANCE * arrays.need[0, j, k]
+        ):
+            return TOO_MUCH
+        useful = useful or amount > 0.0
+    return reach_verdict(arrays, episodes, 0, i, j) if useful else UNLOADS_NOTHING
+
+
+@compiled
+def deliver(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, delivered: Floats, s: int) -> None:
+    """Let UAV `i` of episode 0 make the allowed visit of step `s`, which unloads ``delivered[s, i]``."""
+    fly_to(arrays, episodes, 0, i, j)
+    for k in range(delivered.shape[2]):
+        if delivered[s, i, k] > 0.0:
+            episodes.satisfaction[0] += unload(arrays, episodes, 0, i, j, k, delivered[s, i, k])
+            episodes.load[0, i, k] = _without_rounding(episodes.load[0, i, k], arrays.load[0, i, k])
+            episodes.need[0, j, k] = _without_rounding(episodes.need[0, j, k], arrays.need[0, j, k])
+
+
+@compiled
+def _without_rounding(left: float, whole: float) -> float:
+    """Nothing where what is left of an amount is only the rounding of what was taken from it."""
+    return left if left > 1e-12 * whole else 0.0

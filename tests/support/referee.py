@@ -58,8 +58,26 @@ class Aircraft:
         self.clock = 0.0
 
 
-def replay(problem, assignment):
-    """Reward, satisfaction, distance and remaining needs of a legal plan; raises Illegal otherwise."""
+def unloaded_by(craft, wanted, area, carried, given):
+    """What a visit unloads: all that is wanted and held, or what is given; None if that cannot be.
+
+    Amounts that add up to a whole load or need may exceed it by their rounding.
+    """
+    if given is None:
+        return [min(have, want) for have, want in zip(craft.hold, wanted, strict=True)]
+    for k, amount in enumerate(given):
+        have = craft.hold[k] + TOLERANCE * carried[k]
+        want = wanted[k] + TOLERANCE * area["loadlist"][k]
+        if not 0 <= amount <= min(have, want):
+            return None
+    return list(given)
+
+
+def replay(problem, assignment, delivered=None):
+    """Reward, satisfaction, distance and remaining needs of a legal plan; raises Illegal otherwise.
+
+    With planned unloading `delivered` says what every visit unloads: amounts by step, UAV and material.
+    """
     crs, objective = problem.get("crs", "local"), problem.get("objective") or {}
     charge, must_return = objective.get("charge_return", False), objective.get("return_to_base", True)
     fleet = [Aircraft(record) for record in problem["uavs"]]
@@ -84,7 +102,10 @@ def replay(problem, assignment):
             area, wanted = areas[choice], needs[choice]
             there = (area["x"], area["y"])
             leg = apart(crs, craft.place, there)
-            unloaded = [min(have, want) for have, want in zip(craft.hold, wanted, strict=True)]
+            given = None if delivered is None else delivered[s][i]
+            unloaded = unloaded_by(craft, wanted, area, problem["uavs"][i]["loadlist"], given)
+            if unloaded is None:
+                raise Illegal(s, i, "amount")
             if not any(amount > 0 for amount in unloaded):
                 raise Illegal(s, i, "useless")
             back = apart(crs, there, craft.home) if must_return else 0.0
