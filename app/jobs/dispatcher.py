@@ -9,52 +9,30 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Coroutine, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal, ParamSpec, TypeVar
+from collections.abc import Coroutine, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
 
-from sqlalchemy.exc import OperationalError
 from structlog.contextvars import bind_contextvars
 
-from app.jobs.channel import Channels, rung
+from app.jobs.channel import Channels
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor, Outcome, Raised, Returned
 from app.jobs.failure import INTERNAL_ERROR, describe, failure
+from app.jobs.housekeeping import Housekeeping
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
 from app.jobs.observer import JobObserver
 from app.jobs.owner import is_alive
+from app.jobs.run import Run
 from app.jobs.store import Claim, JobStore, QueueLimit
+from app.jobs.writer import Writer
 
-_SAVE_INTERVAL_S = 1.0
-_RECOVER_INTERVAL_S = 15.0
-_EXPIRE_INTERVAL_S, _EXPIRED_AT_ONCE = 600.0, 50
-_WRITE_ATTEMPTS, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
+_PAUSE_S = 0.1
 _SETTLE_S = 20.0
 
 _log = logging.getLogger(__name__)
-P = ParamSpec("P")
 T = TypeVar("T")
-
-
-@dataclass(slots=True, eq=False)
-class _Run:
-    """A job that runs here."""
-
-    job: Job
-    deadline: float | None
-    progress: Progress
-    saved_at: float
-    unsaved: bool = False
-    execution: Execution | None = None
-    killed_for: Literal["time", "cancel", "stop"] | None = None
-    timers: list[asyncio.TimerHandle] = field(default_factory=list)
-
-    def kill(self, reason: Literal["time", "cancel", "stop"]) -> None:
-        if self.killed_for is None and self.execution is not None:
-            self.killed_for = reason
-            self.execution.kill()
 
 
 class Dispatcher:
@@ -92,13 +70,14 @@ class Dispatcher:
         self._channels = channels
         self._max_queued = max_queued
         self._grace_s = overrun_grace_s
-        self._retention_s = retention_s
         self._observer = observer
-        self._writer = ThreadPoolExecutor(1, thread_name_prefix="jobs-write")
+        self._writer = Writer()
         self._lanes = Lanes(executor.capacity)
-        self._runs: dict[str, _Run] = {}
+        self._runs: dict[str, Run] = {}
         self._dispatching: asyncio.Task[None] | None = None
+        self._house = Housekeeping(store, self._writer, self._runs.values, self._look_after, retention_s)
         self._housekeeping: asyncio.Task[None] | None = None
+        self._unsettled: list[Run] = []
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
         self._wake = asyncio.Event()
@@ -107,16 +86,16 @@ class Dispatcher:
 
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work."""
-        await self._write(self._store.migrate)
+        await self._writer.write(self._store.migrate)
         await self._recover()
         for lane in LANES:
-            durations = await self._write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
+            durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
             self._lanes.ran(lane, durations)
         self._accepting = True
         await self._executor.start(self._wake.set)
         self._wake.set()
         self._dispatching = asyncio.create_task(self._dispatch())
-        self._housekeeping = asyncio.create_task(self._keep_house())
+        self._housekeeping = asyncio.create_task(self._house.keep())
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
@@ -134,10 +113,11 @@ class Dispatcher:
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
         self._ended.set()
+        self._house.end()
         if self._housekeeping is not None:
             await self._housekeeping
         await self._executor.close()
-        await asyncio.to_thread(self._writer.shutdown)
+        await self._writer.close()
 
     async def admit(
         self,
@@ -167,7 +147,7 @@ class Dispatcher:
         if run_now:
             self._lanes.running[lane] += 1
         try:
-            claim, created = await self._write(
+            claim, created = await self._writer.write(
                 self._store.insert,
                 kind,
                 payload,
@@ -198,7 +178,7 @@ class Dispatcher:
         return await asyncio.shield(_spawn(self._cancel(job_id), self._requests))
 
     async def _cancel(self, job_id: str) -> Job:
-        job, before = await self._write(self._store.cancel, job_id)
+        job, before = await self._writer.write(self._store.cancel, job_id)
         if before is JobStatus.QUEUED:
             self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
             self._tell_end(job, None)
@@ -237,11 +217,11 @@ class Dispatcher:
             while self._accepting and (lane := self._lanes.next_lane(self._executor.ready)) is not None:
                 self._lanes.running[lane] += 1
                 try:
-                    claim = await self._write(self._store.claim, lane)
+                    claim = await self._writer.write(self._store.claim, lane)
                 except Exception:
                     self._lanes.running[lane] -= 1
                     _log.exception("no job could be taken from the queue; there will be another try")
-                    await asyncio.sleep(_FIRST_PAUSE_S)
+                    await asyncio.sleep(_PAUSE_S)
                     continue
                 self._lanes.waiting[lane] = 0 if claim is None else max(0, self._lanes.waiting[lane] - 1)
                 if claim is None:
@@ -255,7 +235,7 @@ class Dispatcher:
         So a cancellation, which is committed after it, finds it in ``_runs``.
         """
         job = claim.job
-        run = _Run(job, claim.deadline, job.progress, saved_at=time.monotonic())
+        run = Run(job, claim.deadline, job.progress, saved_at=time.monotonic())
         self._runs[job.id] = run
         channel = self._channels.open(job.id)
 
@@ -274,7 +254,7 @@ class Dispatcher:
             run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
         _spawn(self._finish(run, run.execution), self._finishing)
 
-    async def _finish(self, run: _Run, execution: Execution) -> None:
+    async def _finish(self, run: Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
         bind_contextvars(job_id=run.job.id)
         begun, took = time.monotonic(), None
@@ -286,7 +266,8 @@ class Dispatcher:
                 timer.cancel()
             job = await self._settle(run, outcome)
         except Exception:
-            _log.exception("a job's end could not be stored; the next start runs it again")
+            _log.exception("a job's end could not be stored; once something can be, it is given back")
+            self._unsettled.append(run)
         else:
             if job is None:
                 _log.warning("a job went on without attempt %d", run.job.attempt)
@@ -299,12 +280,12 @@ class Dispatcher:
             self._lanes.waiting[job.lane] += 1
         self._give_back(run.job.lane)
 
-    async def _settle(self, run: _Run, outcome: Outcome) -> Job | None:
+    async def _settle(self, run: Run, outcome: Outcome) -> Job | None:
         """Bring an outcome into the table; None if the job has gone on without this attempt."""
-        job, progress = run.job, run.progress
+        job, progress, surely = run.job, run.progress, self._writer.write_surely
         if isinstance(outcome, Returned):
             try:
-                return await self._write_surely(
+                return await surely(
                     self._store.succeed,
                     job.id,
                     job.attempt,
@@ -322,17 +303,17 @@ class Dispatcher:
                     outcome.error["detail"],
                     extra={"worker_traceback": outcome.traceback},
                 )
-            return await self._write_surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
+            return await surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
         if run.killed_for == "stop":
-            return await self._write_surely(self._store.release, job.id, job.attempt, progress)
+            return await surely(self._store.release, job.id, job.attempt, progress)
         if run.killed_for == "time":
             error = failure(
                 "time-limit-exceeded",
                 f"the work did not stop within {self._grace_s:g} s after its time limit, and was ended",
             )
-            return await self._write_surely(self._store.fail, job.id, job.attempt, error, progress)
+            return await surely(self._store.fail, job.id, job.attempt, error, progress)
         _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)
-        return await self._write_surely(self._store.lose, job.id, job.attempt, outcome.reason, progress)
+        return await surely(self._store.lose, job.id, job.attempt, outcome.reason, progress)
 
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
@@ -353,47 +334,22 @@ class Dispatcher:
         self._lanes.running[lane] -= 1
         self._wake.set()
 
-    async def _keep_house(self) -> None:
-        """Store progress now and then, look for jobs that nobody runs, and forget those of long ago."""
-        recovered, expired = time.monotonic(), float("-inf")
-        while not self._ended.is_set():
-            await rung(self._ended, _SAVE_INTERVAL_S)
-            try:
-                await self._save_progress()
-                if time.monotonic() - recovered >= _RECOVER_INTERVAL_S:
-                    recovered = time.monotonic()
-                    await self._recover()
-                    self._wake.set()
-                if time.monotonic() - expired >= _EXPIRE_INTERVAL_S:
-                    await self._expire()
-                    expired = time.monotonic()
-            except Exception:
-                _log.exception("housekeeping failed; there will be another try")
-
-    async def _save_progress(self) -> None:
-        now = time.monotonic()
-        due = [run for run in self._runs.values() if run.unsaved and now - run.saved_at >= _SAVE_INTERVAL_S]
-        if not due:
-            return
-        for run in due:
-            run.unsaved, run.saved_at = False, now
-        await self._write(
-            self._store.save_progress, [(run.job.id, run.job.attempt, run.progress) for run in due]
-        )
-
-    async def _expire(self) -> None:
-        """Delete ended jobs that are too old, some at a time, so that nobody waits long to write."""
-        if self._retention_s is None:
-            return
-        before, gone, last = time.time() - self._retention_s, 0, _EXPIRED_AT_ONCE
-        while last == _EXPIRED_AT_ONCE and not self._ended.is_set():
-            last = await self._write(self._store.expire, before, _EXPIRED_AT_ONCE)
-            gone += last
-        if gone:
-            _log.info("jobs of long ago were deleted", extra={"jobs": gone})
+    async def _look_after(self) -> None:
+        """Give back the jobs whose end could not be stored, and those of other processes that have died."""
+        while self._unsettled:
+            run = self._unsettled[0]
+            reason = "its end could not be stored"
+            job = await self._writer.write(
+                self._store.lose, run.job.id, run.job.attempt, reason, run.progress
+            )
+            self._unsettled.pop(0)
+            if job is not None and job.status.finished:
+                self._tell_end(job, None)
+        await self._recover()
+        self._wake.set()
 
     async def _recover(self) -> None:
-        changed = await self._write(
+        changed = await self._writer.write(
             self._store.recover, tuple(self._kinds), lambda owner: is_alive(owner, self._owner)
         )
         for job in changed:
@@ -403,25 +359,8 @@ class Dispatcher:
             )
             if job.status.finished:
                 self._tell_end(job, None)
-        waiting = await self._write(self._store.waiting)
+        waiting = await self._writer.write(self._store.waiting)
         self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
-
-    async def _write(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Run a function of the store in the one thread that writes."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._writer, lambda: function(*args, **kwargs))
-
-    async def _write_surely(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Write what must not be lost: a database that is locked or full is tried again for a while."""
-        pause = _FIRST_PAUSE_S
-        for _ in range(_WRITE_ATTEMPTS - 1):
-            try:
-                return await self._write(function, *args, **kwargs)
-            except OperationalError:
-                _log.exception("the database could not be written; next try in %.1f s", pause)
-                await asyncio.sleep(pause)
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
-        return await self._write(function, *args, **kwargs)
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

@@ -14,7 +14,8 @@ from app.jobs.executor import Executor
 from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, Load
 from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
-from app.jobs.store import Database, JobStore
+from app.jobs.reading import Database
+from app.jobs.store import JobStore
 
 # Who waits for a job that another process runs is not told of its end, and looks at the table.
 _LOOK_AGAIN_S = 5.0

@@ -1,5 +1,8 @@
 """The job table: every state a job takes is one transaction here, and nothing else knows the truth.
 
+Taking in and taking out come first, then the ways in which an attempt ends, then what is done to jobs from
+outside; what only looks at the table is in :mod:`app.jobs.reading`.
+
 A transition out of ``running`` names the attempt it belongs to and touches nothing if the job has gone on
 without it: a worker that was given up on cannot overwrite what came after it.
 
@@ -11,28 +14,27 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
-from app.jobs.errors import IdempotencyMismatch, InvalidCursor, QueueFull
+from app.jobs.errors import IdempotencyMismatch, QueueFull
 from app.jobs.failure import failure
 from app.jobs.model import (
     FINISHED,
     Idempotency,
     Job,
     JobKind,
-    JobPage,
     JobStatus,
     Lane,
     Progress,
     WorkResult,
 )
+from app.jobs.reading import Database, JobReader
 from app.jobs.tables import artifacts, idempotency_keys, jobs
 from app.jobs.transitions import (
     end,
@@ -51,19 +53,6 @@ VERSION_TABLE = "alembic_version_jobs"
 OnSuccess = Callable[[Connection, Job, WorkResult], dict[str, Any]]
 
 
-class Database(Protocol):
-    """What the jobs room needs of a database; transactions that write take turns."""
-
-    def write(self) -> AbstractContextManager[Connection]:
-        """Open a write transaction, committed at its end and rolled back by an exception."""
-
-    def read(self) -> AbstractContextManager[Connection]:
-        """Open a read transaction."""
-
-    def migrate(self, script_location: Path, version_table: str) -> None:
-        """Bring the tables of an Alembic folder to its newest version."""
-
-
 @dataclass(frozen=True, slots=True)
 class QueueLimit:
     """How many jobs of a lane may wait, and what to tell a caller for whom there is no place."""
@@ -80,7 +69,7 @@ class Claim:
     deadline: float | None
 
 
-class JobStore:
+class JobStore(JobReader):
     """Reads and writes the job table on behalf of one owner.
 
     Parameters
@@ -102,7 +91,7 @@ class JobStore:
         max_attempts: int,
         dropped_fields: Mapping[str, frozenset[str]] = MappingProxyType({}),
     ) -> None:
-        self._database = database
+        super().__init__(database)
         self._owner = owner
         self._max_attempts = max_attempts
         self._dropped_fields = dropped_fields
@@ -355,51 +344,6 @@ class JobStore:
             job = job_of(row)
         return job, job.status
 
-    def get(self, job_id: str) -> Job:
-        """Return a job.
-
-        Raises
-        ------
-        JobNotFound
-            If no job has that id.
-        """
-        with self._database.read() as connection:
-            return job_of(find(connection, job_id))
-
-    def page(self, limit: int, cursor: str | None) -> JobPage:
-        """Return jobs, newest first, after the cursor; new jobs do not shift the pages that follow.
-
-        Raises
-        ------
-        InvalidCursor
-            If no page gave out such a cursor.
-        """
-        statement = select_jobs.order_by(jobs.c.number.desc()).limit(limit + 1)
-        if cursor is not None:
-            if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
-                raise InvalidCursor(cursor)
-            statement = statement.where(jobs.c.number < int(cursor))
-        with self._database.read() as connection:
-            rows = connection.execute(statement).mappings().all()
-        more = len(rows) > limit
-        rows = rows[:limit]
-        return JobPage(tuple(job_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
-
-    def artifact(self, job_id: str) -> bytes | None:
-        """Return the bytes that a job left behind; None if it left none.
-
-        Raises
-        ------
-        JobNotFound
-            If no job has that id.
-        """
-        with self._database.read() as connection:
-            find(connection, job_id)
-            data: bytes | None = connection.scalar(
-                sa.select(artifacts.c.data).where(artifacts.c.job_id == job_id)
-            )
-            return data
-
     def expire(self, before: float, limit: int) -> int:
         """Delete finished jobs with what they left and the idempotency keys they came with.
 
@@ -424,24 +368,3 @@ class JobStore:
         with self._database.write() as connection:
             ended = jobs.c.number.in_(oldest), jobs.c.status.in_(FINISHED)
             return connection.execute(sa.delete(jobs).where(*ended)).rowcount
-
-    def waiting(self) -> dict[Lane, int]:
-        """Return how many jobs wait in each lane that has any."""
-        with self._database.read() as connection:
-            rows = connection.execute(
-                sa.select(jobs.c.lane, sa.func.count().label("jobs"))
-                .where(jobs.c.status == JobStatus.QUEUED)
-                .group_by(jobs.c.lane)
-            )
-            return {row.lane: row.jobs for row in rows}
-
-    def recent_durations(self, lane: Lane, limit: int) -> list[float]:
-        """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
-        with self._database.read() as connection:
-            rows = connection.execute(
-                sa.select(jobs.c.finished_at - jobs.c.started_at)
-                .where(jobs.c.status == JobStatus.SUCCEEDED, jobs.c.lane == lane)
-                .order_by(jobs.c.number.desc())
-                .limit(limit)
-            )
-            return [float(seconds) for (seconds,) in rows][::-1]

@@ -10,6 +10,7 @@ from harness import PATIENCE_S, finished, make_service, reports, running, url_of
 from sqlalchemy.exc import OperationalError
 
 from app.domain.errors import InvalidCheckpoint
+from app.jobs import housekeeping, writer
 from app.jobs.errors import Draining, IdempotencyMismatch, JobNotFound, QueueFull, UnknownJobKind
 from app.jobs.lanes import Lanes
 from app.jobs.model import Idempotency, JobKind, JobStatus
@@ -316,6 +317,28 @@ def test_a_result_survives_a_database_that_cannot_be_written_for_a_while(tmp_pat
         done = await finished(service, job)
         assert (done.status, done.attempt, database.failures) == (JobStatus.SUCCEEDED, 1, 0)
         assert (await finished(service, waiting)).status is JobStatus.SUCCEEDED
+        await service.stop(0)
+        database.dispose()
+
+    asyncio.run(scenario())
+
+
+def test_a_result_that_could_not_be_stored_for_long_costs_an_attempt_and_not_the_job(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "_FIRST_PAUSE_S", 0.0)
+    monkeypatch.setattr(housekeeping, "_SAVE_INTERVAL_S", 0.01)
+    monkeypatch.setattr(housekeeping, "_LOOK_INTERVAL_S", 0.0)
+
+    async def scenario():
+        gate = tmp_path / "gate"
+        database = FailingDatabase(url_of(tmp_path))
+        service = make_service(database)
+        await service.start()
+        job, _ = await service.submit("gated", {"path": str(gate)})
+        await reports(service, job)
+        database.failures = 100
+        gate.touch()
+        done = await finished(service, job)
+        assert (done.status, done.attempt, database.failures) == (JobStatus.SUCCEEDED, 2, 0)
         await service.stop(0)
         database.dispose()
 

@@ -1,0 +1,47 @@
+"""A job that runs here, as the dispatcher sees it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import Literal
+
+from app.jobs.executor import Execution
+from app.jobs.model import Job, Progress
+
+Reason = Literal["time", "cancel", "stop"]
+"""Why a worker was killed: its work did not end with its time, or its cancellation, or the service."""
+
+
+@dataclass(slots=True, eq=False)
+class Run:
+    """One attempt at a job.
+
+    Attributes
+    ----------
+    job, deadline
+        As they were taken from the queue.
+    progress
+        The newest; ``unsaved`` if it is not in the table yet, where the last went at ``saved_at``.
+    execution
+        The work; None until it is handed over.
+    killed_for
+        Why its worker was killed, if it was.
+    timers
+        What would kill it later.
+    """
+
+    job: Job
+    deadline: float | None
+    progress: Progress
+    saved_at: float
+    unsaved: bool = False
+    execution: Execution | None = None
+    killed_for: Reason | None = None
+    timers: list[asyncio.TimerHandle] = field(default_factory=list)
+
+    def kill(self, reason: Reason) -> None:
+        """End the worker, for the first reason that is given."""
+        if self.killed_for is None and self.execution is not None:
+            self.killed_for = reason
+            self.execution.kill()
