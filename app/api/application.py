@@ -14,6 +14,7 @@ from starlette.middleware.cors import CORSMiddleware
 import app
 from app.api.access.guard import Guard
 from app.api.access.keys import KeyStore
+from app.api.dashboard import install_dashboard
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
 from app.api.job_kinds import job_kinds
@@ -101,6 +102,7 @@ def create_application(settings: Settings) -> FastAPI:
     for room in (allocation, algorithms, jobs, plans, library, examples, operations):
         application.include_router(room.router)
     install_error_handlers(application)
+    install_dashboard(application, settings)
     install_documentation(application, keys_required=settings.always_needs_keys)
     return application
 

@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.routing import APIRoute
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse
+from starlette.responses import HTMLResponse
 from starlette.staticfiles import StaticFiles
 
 from app.api.access.guard import SCHEME, document, needed_role
@@ -45,7 +45,7 @@ def operation_id(route: APIRoute) -> str:
 
 
 def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
-    """Give an application its ``/docs``, to which ``/`` leads, and errors and keys in its description."""
+    """Give an application its ``/docs``, and errors and keys in its description."""
     generate = application.openapi
 
     def openapi() -> dict[str, Any]:
@@ -79,10 +79,6 @@ def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
         page.headers["Content-Security-Policy"] = content_policy(hashes)
         return page
 
-    async def lead_to_documentation(request: Request) -> RedirectResponse:
-        return RedirectResponse(f"{request.scope.get('root_path', '').rstrip('/')}/docs")
-
     application.openapi = openapi  # type: ignore[method-assign]  # the documented way to change it
-    application.add_route("/", lead_to_documentation, include_in_schema=False)
     application.add_route("/docs", show_documentation, include_in_schema=False)
     application.mount(_ASSETS, StaticFiles(packages=[("fastapi_swagger", "resources")]))

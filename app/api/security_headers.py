@@ -23,6 +23,21 @@ def content_policy(script_hashes: Sequence[str] = ()) -> str:
     )
 
 
+def page_policy(pictures_from: str | None = None) -> str:
+    """Return the Content-Security-Policy of the dashboard: its own files only, nothing inline.
+
+    Parameters
+    ----------
+    pictures_from
+        The origin of a tile server; None: no picture from elsewhere either.
+    """
+    pictures = " ".join(["img-src 'self' data: blob:", *([pictures_from] if pictures_from else [])])
+    return (
+        f"default-src 'self'; script-src 'self'; style-src 'self'; {pictures}; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",

@@ -124,6 +124,8 @@ def test_only_the_whole_key_is_recognised(keys):
     [
         ("GET", "/healthz", None),
         ("GET", "/readyz", None),
+        ("GET", "/", None),
+        ("GET", "/dashboard/js/main.js", None),
         ("GET", "/docs", None),
         ("GET", "/docs/assets/swagger-ui.css", None),
         ("GET", "/metrics", Role.ALLOCATE),

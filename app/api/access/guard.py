@@ -21,7 +21,7 @@ from app.api.problem_details import problem_response, responses
 OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", "/openapi.json"})
 """What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""
 
-OPEN_FOLDERS = ("/docs/assets/",)
+OPEN_FOLDERS = ("/docs/assets/", "/dashboard/")
 
 SCHEME: dict[str, Any] = {
     "type": "http",

@@ -1,0 +1,84 @@
+/** What a plan looks like: where routes go, what areas get, which colour a UAV has. */
+
+import { position } from "./problem.js";
+
+const GOLDEN_ANGLE = 137.508;
+const FIRST_HUES = [250, 30, 150, 330, 85, 200, 295, 55];
+
+/** Hue of a UAV's routes and symbol, far from its neighbours' in the list. */
+export function hue(index) {
+  return FIRST_HUES[index] ?? (index * GOLDEN_ANGLE) % 360;
+}
+
+/**
+ * Routes of an answer, or of a list of joint actions, in one form.
+ * @param {object} problem
+ * @param {object | number[][]} plan an answer of the API, or an incumbent's `assignment`
+ * @returns {{uav: object, index: number, stops: {target: object, stop: object | null}[], points: {x, y}[]}[]}
+ *   only of UAVs that visit something; points begin at the present position and end at the start
+ */
+export function routesOf(problem, plan) {
+  if (!plan) return [];
+  const visits = Array.isArray(plan) ? visitsOfActions(problem, plan) : visitsOfAnswer(problem, plan);
+  return problem.uavs
+    .map((uav, index) => ({
+      uav,
+      index,
+      stops: visits[index],
+      points: [position(uav), ...visits[index].map(({ target }) => target), { x: uav.x_s, y: uav.y_s }],
+    }))
+    .filter(({ stops }) => stops.length);
+}
+
+function visitsOfActions(problem, assignment) {
+  return problem.uavs.map((_, i) =>
+    assignment
+      .map((joint) => problem.targets[joint[i]])
+      .filter((target) => target !== undefined)
+      .map((target) => ({ target, stop: null })),
+  );
+}
+
+function visitsOfAnswer(problem, answer) {
+  const targets = new Map(problem.targets.map((target) => [target.id, target]));
+  const routes = new Map(answer.routes.map((route) => [route.uav_id, route]));
+  return problem.uavs.map((uav) =>
+    (routes.get(uav.id)?.stops ?? []).map((stop) => ({ target: targets.get(stop.target_id), stop })),
+  );
+}
+
+/**
+ * How much of each area's need an answer meets, 0 to 1; an area that needs nothing is met.
+ * @returns {Map<string, number>} by target id
+ */
+export function met(problem, answer) {
+  const remaining = new Map((answer?.unmet ?? []).map((each) => [each.target_id, sum(each.remaining)]));
+  return new Map(
+    problem.targets.map((target) => {
+      const need = sum(target.loadlist);
+      if (need === 0) return [target.id, 1];
+      return [target.id, answer ? 1 - (remaining.get(target.id) ?? 0) / need : 0];
+    }),
+  );
+}
+
+/** What a UAV is doing, in a word. */
+export function stateOf(uav) {
+  if (uav.ret) return "returning";
+  const now = position(uav);
+  return (uav.dis ?? 0) > 0 || now.x !== uav.x_s || now.y !== uav.y_s ? "in the air" : "at its base";
+}
+
+/** Range left of a UAV as the problem has it. */
+export function rangeLeft(uav) {
+  return uav.voyage - (uav.dis ?? 0);
+}
+
+/** Urgency class 1 to 5 of a level, against the highest of the problem. */
+export function urgency(level, highest) {
+  return highest > 0 ? Math.min(5, Math.max(1, Math.ceil((5 * level) / highest))) : 1;
+}
+
+export function sum(numbers) {
+  return numbers.reduce((total, each) => total + each, 0);
+}
