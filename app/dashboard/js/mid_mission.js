@@ -1,0 +1,210 @@
+/**
+ * The state of a mission at a moment of its plan, as a problem that can be allocated again (x_c, y_c, dis, ret,
+ * what is still carried and needed), and what a new plan changes against the old one. No page, no requests.
+ */
+
+const EARTH_RADIUS_KM = 6371.0088;
+const radians = (degrees) => (degrees * Math.PI) / 180;
+const degrees = (angle) => (angle * 180) / Math.PI;
+
+/** Distance of two points [x, y], in the problem's units or km. */
+export function distance(crs, [xa, ya], [xb, yb]) {
+  if (crs !== "wgs84") return Math.hypot(xa - xb, ya - yb);
+  const h =
+    Math.sin(radians(yb - ya) / 2) ** 2 +
+    Math.cos(radians(ya)) * Math.cos(radians(yb)) * Math.sin(radians(xb - xa) / 2) ** 2;
+  return 2 * EARTH_RADIUS_KM * Math.asin(Math.min(1, Math.sqrt(h)));
+}
+
+/** The point a fraction of the way from one to the other: on the line, or on the great circle. */
+export function between(crs, from, to, fraction) {
+  const [xa, ya] = from;
+  const [xb, yb] = to;
+  if (fraction <= 0) return from;
+  if (fraction >= 1) return to;
+  if (crs !== "wgs84") return [xa + (xb - xa) * fraction, ya + (yb - ya) * fraction];
+  const angle = distance(crs, from, to) / EARTH_RADIUS_KM;
+  if (angle < 1e-12) return from;
+  const a = Math.sin((1 - fraction) * angle) / Math.sin(angle);
+  const b = Math.sin(fraction * angle) / Math.sin(angle);
+  const x = a * Math.cos(radians(ya)) * Math.cos(radians(xa)) + b * Math.cos(radians(yb)) * Math.cos(radians(xb));
+  const y = a * Math.cos(radians(ya)) * Math.sin(radians(xa)) + b * Math.cos(radians(yb)) * Math.sin(radians(xb));
+  const z = a * Math.sin(radians(ya)) + b * Math.sin(radians(yb));
+  return [degrees(Math.atan2(y, x)), degrees(Math.atan2(z, Math.hypot(x, y)))];
+}
+
+const uavId = (uav, i) => uav.id ?? `uav-${i + 1}`;
+const targetId = (target, j) => target.id ?? `area-${j + 1}`;
+const rounded = (amount) => (Math.abs(amount) < 1e-9 ? 0 : amount);
+const less = (amounts, taken) => amounts.map((amount, k) => Math.max(0, rounded(amount - taken[k])));
+
+/** When the last UAV is home. */
+export function missionEnd(problem, answer) {
+  const byId = new Map(problem.targets.map((target, j) => [targetId(target, j), target]));
+  return Math.max(
+    0,
+    ...answer.routes.map((route, i) => {
+      const last = route.stops.at(-1);
+      const leaves = last ? last.arrival_time + (byId.get(last.target_id).service_time ?? 0) : 0;
+      return leaves + route.return_distance / problem.uavs[i].speed;
+    }),
+  );
+}
+
+/** Every moment at which something happens: arrivals, ends of stays, returns; in order, each once. */
+export function moments(problem, answer) {
+  const byId = new Map(problem.targets.map((target, j) => [targetId(target, j), target]));
+  const all = new Set([0, missionEnd(problem, answer)]);
+  for (const route of answer.routes)
+    for (const stop of route.stops) {
+      all.add(stop.arrival_time);
+      all.add(stop.arrival_time + (byId.get(stop.target_id).service_time ?? 0));
+    }
+  return [...all].sort((a, b) => a - b);
+}
+
+/** What one UAV is doing at a moment: where it is, how far it has flown, which stops are behind it. */
+export function uavAt(problem, answer, i, time) {
+  const uav = problem.uavs[i];
+  const route = answer.routes[i];
+  const home = [uav.x_s, uav.y_s];
+  const byId = new Map(problem.targets.map((target, j) => [targetId(target, j), target]));
+  let place = [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s];
+  let flown = uav.dis ?? 0;
+  let leaves = 0;
+  for (const [order, stop] of route.stops.entries()) {
+    const target = byId.get(stop.target_id);
+    const there = [target.x, target.y];
+    if (time < stop.arrival_time) {
+      const fraction = Math.max(0, (time - leaves) / (stop.arrival_time - leaves));
+      return {
+        place: between(problem.crs, place, there, fraction),
+        flown: flown + fraction * stop.distance,
+        done: order,
+        doing: fraction > 0 ? "flying" : "waiting",
+        next: stop.target_id,
+        returning: Boolean(uav.ret),
+      };
+    }
+    flown += stop.distance;
+    place = there;
+    leaves = stop.arrival_time + (target.service_time ?? 0);
+    if (time < leaves)
+      return {
+        place, flown, done: order + 1, doing: "unloading", next: stop.target_id,
+        // With its last stop it is as good as sent home, but a new plan may still have another idea.
+        returning: Boolean(uav.ret),
+      };
+  }
+  const done = route.stops.length;
+  if (route.return_distance <= 1e-9)
+    return { place, flown, done, doing: done ? "home" : "idle", next: null, returning: Boolean(uav.ret) || done > 0 };
+  const fraction = Math.min(1, (time - leaves) / (route.return_distance / uav.speed));
+  return {
+    place: between(problem.crs, place, home, fraction),
+    flown: flown + fraction * route.return_distance,
+    done,
+    doing: fraction < 1 ? "returning" : "home",
+    next: null,
+    // At the very moment it leaves it can still be given something else.
+    returning: Boolean(uav.ret) || fraction > 0,
+  };
+}
+
+/**
+ * The mission at a moment as a problem.
+ *
+ * Material counts as unloaded on arrival. Deadlines are counted from the moment on. The distance weight is the
+ * one that the plan was found with, so that rewards before and after can be compared.
+ *
+ * @param {object} problem what was allocated
+ * @param {object} answer the plan for it
+ * @param {number} time from the plan's beginning
+ * @param {object} choices lost: ids of UAVs that are out; recall: UAVs on their way home may get tasks again
+ */
+export function problemAt(problem, answer, time, { lost = new Set(), recall = false } = {}) {
+  const needs = new Map(problem.targets.map((target, j) => [targetId(target, j), target.loadlist.slice()]));
+  const uavs = [];
+  problem.uavs.forEach((uav, i) => {
+    const now = uavAt(problem, answer, i, time);
+    let load = uav.loadlist.slice();
+    for (const stop of answer.routes[i].stops.slice(0, now.done)) {
+      load = less(load, stop.delivered);
+      needs.set(stop.target_id, less(needs.get(stop.target_id), stop.delivered));
+    }
+    if (lost.has(uavId(uav, i))) return;
+    const ret = now.returning && !(recall && now.doing === "returning" && !uav.ret) ? 1 : 0;
+    uavs.push({
+      ...uav, id: uavId(uav, i), x_c: now.place[0], y_c: now.place[1], dis: now.flown, ret, loadlist: load,
+    });
+  });
+  const targets = problem.targets.map((target, j) => ({
+    ...target,
+    id: targetId(target, j),
+    loadlist: needs.get(targetId(target, j)),
+    ...(target.deadline == null ? {} : { deadline: target.deadline - time }),
+  }));
+  return {
+    ...problem, uavs, targets,
+    objective: { ...problem.objective, distance_weight: answer.distance_weight },
+  };
+}
+
+/** What is left of a plan after a moment, times counted from there; UAVs that are lost do nothing more. */
+export function remainder(problem, answer, time, lost = new Set()) {
+  return answer.routes.map((route, i) => {
+    const id = uavId(problem.uavs[i], i);
+    if (lost.has(id)) return { uav_id: id, lost: true, stops: [], distance: 0 };
+    const now = uavAt(problem, answer, i, time);
+    const stops = route.stops.slice(now.done).map((stop) => ({ ...stop, arrival_time: stop.arrival_time - time }));
+    const flown = now.flown - (problem.uavs[i].dis ?? 0);
+    return { uav_id: id, lost: false, stops, distance: stops.length ? Math.max(0, route.distance - flown) : 0 };
+  });
+}
+
+/**
+ * A new plan beside the rest of the old one.
+ *
+ * @param {object} now the problem at the moment, as it was allocated again
+ * @param {object[]} before what remainder() gives
+ * @param {object} answer the new plan
+ */
+export function changes(now, before, answer) {
+  const after = new Map(answer.routes.map((route) => [route.uav_id, route]));
+  const routes = before.map((old) => {
+    const was = old.stops.map((stop) => stop.target_id);
+    const is = (after.get(old.uav_id)?.stops ?? []).map((stop) => stop.target_id);
+    const kind = old.lost ? "lost" : was.join("\n") === is.join("\n") ? "same" : "changed";
+    return { uav_id: old.uav_id, before: was, after: is, kind };
+  });
+  const known = new Set(before.map((old) => old.uav_id));
+  for (const route of answer.routes)
+    if (!known.has(route.uav_id))
+      routes.push({ uav_id: route.uav_id, before: [], after: route.stops.map((stop) => stop.target_id), kind: "new" });
+  const given = (list) => {
+    const sums = new Map();
+    for (const route of list)
+      for (const stop of route.stops)
+        stop.delivered.forEach((amount, k) => {
+          const sum = sums.get(stop.target_id) ?? [];
+          sum[k] = (sum[k] ?? 0) + amount;
+          sums.set(stop.target_id, sum);
+        });
+    return sums;
+  };
+  const old = given(before);
+  const fresh = given(answer.routes);
+  const share = (target, amounts) => {
+    const need = target.loadlist.reduce((a, b) => a + b, 0);
+    const got = target.loadlist.reduce((sum, most, k) => sum + Math.min(most, amounts?.[k] ?? 0), 0);
+    return need > 0 ? got / need : null;
+  };
+  const areas = now.targets.map((target, j) => ({
+    target_id: targetId(target, j),
+    before: share(target, old.get(targetId(target, j))),
+    after: share(target, fresh.get(targetId(target, j))),
+  }));
+  const satisfaction = now.targets.reduce((sum, target, j) => sum + target.level * (areas[j].before ?? 0), 0);
+  const flown = before.reduce((sum, route) => sum + route.distance, 0);
+  return { routes, areas, kept: { satisfaction, distance: flown, reward: satisfaction - answer.distance_weight * flown } };
+}

@@ -1,0 +1,61 @@
+/** A task, and if there is one its plan, as a small picture. */
+
+import { svg } from "./dom.js";
+
+export const ROUTE_COLOURS = ["#0b6e99", "#c2410c", "#3d7a2a", "#7a3f9d", "#9a6700", "#00736b", "#b0305c", "#475569"];
+
+/**
+ * Draw a task.
+ * @param {object} task the problem
+ * @param {object} options answer: a plan to draw; label: for those who do not see it; width, height: of the box
+ * @returns {SVGElement}
+ */
+export function taskPicture(task, { answer = null, label = "", width = 240, height = 160 } = {}) {
+  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label, class: "task-picture" });
+  const places = [
+    ...task.uavs.flatMap((uav) => [[uav.x_s, uav.y_s], [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s]]),
+    ...task.targets.map((target) => [target.x, target.y]),
+  ];
+  const xs = places.map(([x]) => x);
+  const ys = places.map(([, y]) => y);
+  const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const margin = 10;
+  const scale = Math.min((width - 2 * margin) / (right - left || 1), (height - 2 * margin) / (high - low || 1));
+  const dx = (width - scale * (right - left)) / 2;
+  const dy = (height - scale * (high - low)) / 2;
+  const at = ([x, y]) => [dx + (x - left) * scale, height - dy - (y - low) * scale];
+  const byId = new Map(task.targets.map((target, j) => [target.id ?? `area-${j + 1}`, target]));
+  answer?.routes.forEach((route, i) => {
+    if (!route.stops.length) return;
+    const uav = task.uavs[i];
+    const points = [
+      [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s],
+      ...route.stops.map((stop) => [byId.get(stop.target_id).x, byId.get(stop.target_id).y]),
+      [uav.x_s, uav.y_s],
+    ].map((place) => at(place).map((value) => value.toFixed(1)).join(","));
+    picture.append(
+      svg("polyline", {
+        points: points.join(" "), fill: "none", stroke: ROUTE_COLOURS[i % ROUTE_COLOURS.length],
+        "stroke-width": 1.6, "stroke-linejoin": "round", "data-uav": route.uav_id,
+      }),
+    );
+  });
+  const most = Math.max(1e-12, ...task.targets.map((target) => target.level));
+  const unmet = new Set(answer?.unmet.map((each) => each.target_id));
+  task.targets.forEach((target, j) => {
+    const [cx, cy] = at([target.x, target.y]);
+    const urgency = target.level / most;
+    const met = answer && !unmet.has(target.id ?? `area-${j + 1}`);
+    picture.append(
+      svg("circle", {
+        cx: cx.toFixed(1), cy: cy.toFixed(1), r: (2.5 + 2.5 * urgency).toFixed(1), class: met ? "area met" : "area",
+        "fill-opacity": met ? 1 : (0.35 + 0.65 * urgency).toFixed(2),
+      }),
+    );
+  });
+  for (const uav of task.uavs) {
+    const [x, y] = at([uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s]);
+    picture.append(svg("path", { d: `M${x.toFixed(1)} ${(y - 4).toFixed(1)}l3.5 6.5h-7z`, class: "uav" }));
+  }
+  return picture;
+}

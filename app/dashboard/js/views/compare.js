@@ -1,0 +1,166 @@
+/** Algorithms on the same problem, side by side: reward against time, numbers, plans next to each other. */
+
+import { drawCurves } from "../curve.js";
+import { h, notify, number, shown } from "../dom.js";
+import { registerView } from "../registry.js";
+import { allocate } from "../running.js";
+import { get, set, subscribe } from "../state.js";
+import { taskPicture } from "../task_picture.js";
+
+const PREFERRED = ["auto", "transfer_qmix", "local_search", "ga", "greedy"];
+
+let parts = null;
+let stopping = null;
+let compared = null; // {problem, runs: [{algorithm, trace, answer, error}]}
+
+registerView({ id: "compare", title: "Compare", order: 40, layout: "page", mount, show: draw });
+
+function mount(root) {
+  parts = {
+    choices: h("div", { class: "choices", role: "group", "aria-label": "Algorithms" }),
+    limit: h("input", { type: "number", min: "0.05", step: "any", value: "2", id: "compare-limit" }),
+    seed: h("input", { type: "number", min: "0", step: "1", value: "123", id: "compare-seed" }),
+    start: h("button", { type: "submit", class: "primary" }, "Compare"),
+    stop: h("button", { type: "button", class: "quiet", disabled: true, onclick: () => stopping?.abort() }, "Stop"),
+    status: h("p", { class: "muted", role: "status", "data-testid": "compare-status" }),
+    time: h("div", { class: "curve", "data-testid": "compare-time" }),
+    epochs: h("div", { class: "curve" }),
+    numbers: h("div", { class: "scroll" }),
+    trace: h("details", { hidden: true }),
+    plans: h("div", { class: "plans" }),
+  };
+  root.append(
+    h("h2", {}, "Compare algorithms"),
+    h("p", { class: "muted lead" },
+      "Each gets the problem on screen, the same seed and the same time, one after the other, so that none takes the machine from another."),
+    h("form", { class: "card compare-form", onsubmit: (event) => { event.preventDefault(); void run(); } },
+      parts.choices,
+      h("label", {}, "Time limit, s ", parts.limit),
+      h("label", {}, "Seed ", parts.seed),
+      h("p", { class: "actions" }, parts.start, " ", parts.stop)),
+    parts.status,
+    h("div", { class: "two" },
+      h("section", { class: "card" }, h("h3", {}, "Reward against time"), parts.time),
+      h("section", { class: "card" }, h("h3", {}, "Reward against epochs or generations"), parts.epochs)),
+    h("section", { class: "card" }, h("h3", {}, "Numbers"), parts.numbers, parts.trace),
+    h("section", {}, h("h3", {}, "Plans"), parts.plans));
+  subscribe(["algorithms"], choices);
+  choices();
+  draw();
+}
+
+function choices() {
+  const { algorithms } = get();
+  const before = new Set([...parts.choices.querySelectorAll("input:checked")].map((box) => box.value));
+  const wanted = before.size ? before : new Set(PREFERRED.filter((name) => algorithms.some((a) => a.name === name)));
+  parts.choices.replaceChildren(
+    ...algorithms.map(({ name, summary }) =>
+      h("label", { class: "chip", title: summary },
+        h("input", { type: "checkbox", name: "algorithm", value: name, checked: wanted.has(name) }), " ", name)));
+}
+
+async function run() {
+  const { problem } = get();
+  const chosen = [...parts.choices.querySelectorAll("input:checked")].map((box) => box.value);
+  if (!problem || !chosen.length) {
+    notify("Choose at least one algorithm, and a problem.", "error");
+    return;
+  }
+  stopping = new AbortController();
+  parts.start.disabled = true;
+  parts.stop.disabled = false;
+  compared = { problem, runs: chosen.map((algorithm) => ({ algorithm, trace: [], answer: null, error: null })) };
+  for (const each of compared.runs) {
+    if (stopping.signal.aborted) break;
+    parts.status.textContent = `${each.algorithm} is running …`;
+    try {
+      each.answer = await allocate(
+        { ...problem, algorithm: each.algorithm, seed: Number(parts.seed.value), time_limit_s: Number(parts.limit.value) },
+        {
+          signal: stopping.signal,
+          onProgress: ({ best_reward: reward }, seconds) => {
+            if (reward !== null && reward !== undefined) each.trace.push([seconds, reward]);
+            drawTime();
+          },
+        });
+      if (each.answer) each.trace = rising([...each.trace, [each.answer.elapsed_s, each.answer.reward]]);
+    } catch (error) {
+      each.error = error.message;
+    }
+    draw();
+  }
+  const done = compared.runs.filter((each) => each.answer).length;
+  parts.status.textContent = `${done} of ${compared.runs.length} algorithms have a plan.`;
+  parts.start.disabled = false;
+  parts.stop.disabled = true;
+}
+
+/** The best so far at every moment; the last event may come before or after the end that the service measured. */
+function rising(trace) {
+  let best = -Infinity;
+  return [...trace].sort((a, b) => a[0] - b[0]).map(([t, reward]) => [t, (best = Math.max(best, reward))]);
+}
+
+function drawTime() {
+  const series = (compared?.runs ?? []).map((each) => ({ name: each.algorithm, points: rising(each.trace) }));
+  drawCurves(parts.time, series, { x: "seconds", label: "Reward of the best plan against time, a line an algorithm" });
+}
+
+function draw() {
+  if (!parts) return;
+  drawTime();
+  const runs = compared?.runs ?? [];
+  drawCurves(parts.epochs,
+    runs.filter((each) => each.answer).map((each) => ({
+      name: each.algorithm,
+      points: each.answer.history.epoch.map((epoch, i) => [epoch, each.answer.history.reward[i]]),
+    })),
+    { x: "epoch or generation", label: "Reward against epochs, a line an algorithm" });
+  const best = Math.max(...runs.filter((each) => each.answer).map((each) => each.answer.reward));
+  const bounded = runs.some((each) => each.answer?.bound != null);
+  parts.numbers.replaceChildren(
+    h("table", { "data-testid": "compare-numbers" },
+      h("thead", {}, h("tr", {},
+        ["Algorithm", "Reward", "Of the best", "Satisfaction", "Distance", "Areas unmet", "Seconds", ...(bounded ? ["Bound"] : [])]
+          .map((title, i) => h("th", { scope: "col", class: i ? "n" : null }, title)))),
+      h("tbody", {}, runs.map((each) => row(each, best, bounded)))));
+  parts.trace.hidden = !runs.length;
+  parts.trace.replaceChildren(
+    h("summary", {}, "The curves in numbers"),
+    h("table", {},
+      h("thead", {}, h("tr", {}, ["Algorithm", "Seconds", "Reward"].map((title) => h("th", { scope: "col" }, title)))),
+      h("tbody", {}, runs.flatMap((each) => each.trace.map(([t, reward]) =>
+        h("tr", {}, h("td", {}, each.algorithm), h("td", {}, number(t)), h("td", {}, number(reward))))))));
+  parts.plans.replaceChildren(...runs.filter((each) => each.answer).map(card));
+  if (!runs.length) parts.plans.append(h("p", { class: "muted" }, "The plans come here."));
+}
+
+function row({ algorithm, answer, error }, best, bounded) {
+  if (!answer) {
+    const why = error ?? "no plan yet";
+    return h("tr", {}, h("th", { scope: "row" }, algorithm), h("td", { colspan: "7", class: error ? "error" : "muted" }, why));
+  }
+  return h("tr", { class: answer.reward === best ? "best" : null, "data-algorithm": algorithm },
+    h("th", { scope: "row" }, algorithm),
+    h("td", { class: "n" }, number(answer.reward, 5)),
+    h("td", { class: "n" }, best > 0 ? `${((100 * answer.reward) / best).toFixed(1)} %` : "–"),
+    h("td", { class: "n" }, number(answer.satisfaction, 5)),
+    h("td", { class: "n" }, number(answer.distance, 5)),
+    h("td", { class: "n" }, number(answer.unmet.length)),
+    h("td", { class: "n" }, number(answer.elapsed_s, 3)),
+    bounded && h("td", { class: "n" }, answer.bound == null ? "–" : number(answer.bound.value ?? answer.bound, 5)));
+}
+
+function card({ algorithm, answer }) {
+  const { problem } = compared;
+  const flying = answer.routes.filter((route) => route.stops.length).length;
+  const label = `Plan of ${algorithm}: reward ${shown(answer.reward)}`;
+  return h("article", { class: "card plan" },
+    h("h4", {}, algorithm),
+    taskPicture(problem, { answer, label, width: 320, height: 220 }),
+    h("p", {}, "Reward ", number(answer.reward), `, ${flying} of ${answer.routes.length} UAVs, ${answer.unmet.length} areas unmet`),
+    h("button", { type: "button", class: "quiet", onclick: () => {
+      set({ problem, answer, answerProblem: problem, incumbent: null });
+      notify(`The plan of ${algorithm} is the one on the map now.`);
+    } }, "Take this plan"));
+}

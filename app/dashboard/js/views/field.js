@@ -1,0 +1,328 @@
+/** In the field: a mission at a moment of its plan, what has happened until then, and a new plan from there. */
+
+import { ApiError } from "../api.js";
+import { h, notify, number, shown } from "../dom.js";
+import { changes, missionEnd, moments, problemAt, remainder, uavAt } from "../mid_mission.js";
+import { registerView } from "../registry.js";
+import { allocate } from "../running.js";
+import { get, set, subscribe } from "../state.js";
+
+const FRAMES = 240; // the whole mission in about 12 s
+
+let parts = null;
+let map = null;
+let clock = 0;
+let lost = new Set();
+let happened = new Map(); // area id → {level, loadlist} as it is now
+let found = []; // new areas
+let outcome = null; // {now, difference, answer}
+let ticking = null;
+let stopping = null;
+let known = null; // the answer that all of the above is about
+
+registerView({ id: "field", title: "In the field", order: 50, layout: "panel", mount, show, hide });
+
+function mount(root, context) {
+  map = context.map;
+  parts = {
+    dock: context.dock,
+    empty: h("p", { class: "muted" }, "Allocate first: the mission that goes on here is the plan that was found."),
+    body: h("div", { hidden: true }),
+    time: h("input", { type: "range", min: "0", step: "any", value: "0", "aria-label": "Clock", id: "field-slider" }),
+    exact: h("input", { type: "number", min: "0", step: "any", value: "0", "aria-label": "Time", id: "field-time" }),
+    shown: h("output", { for: "field-slider field-time", "data-testid": "field-clock" }),
+    run: h("button", { type: "button", onclick: toggle }, "Let it run"),
+    next: h("button", { type: "button", onclick: () => step(1) }, "Next event"),
+    before: h("button", { type: "button", onclick: () => step(-1) }, "Event before"),
+    uavs: h("div", { class: "scroll" }),
+    areas: h("div", { class: "scroll" }),
+    recall: h("input", { type: "checkbox", name: "recall", onchange: draw }),
+    algorithm: h("select", { name: "algorithm" }),
+    limit: h("input", { type: "number", min: "0.05", step: "any", value: "2", name: "time_limit_s" }),
+    start: h("button", { type: "submit", class: "primary" }, "Allocate again from here"),
+    stop: h("button", { type: "button", class: "quiet", disabled: true, onclick: () => stopping?.abort() }, "Stop"),
+    status: h("p", { class: "muted", role: "status", "data-testid": "field-status" }),
+  };
+  parts.time.addEventListener("input", () => moveTo(Number(parts.time.value)));
+  parts.exact.addEventListener("change", () => moveTo(Number(parts.exact.value)));
+  parts.body.append(
+    h("section", { class: "card" },
+      h("h3", {}, "Clock"),
+      h("p", { class: "clock" }, parts.time, parts.exact, parts.shown),
+      h("p", { class: "actions" }, parts.before, " ", parts.run, " ", parts.next)),
+    h("section", { class: "card" }, h("h3", {}, "UAVs"), parts.uavs,
+      h("label", { class: "row" }, h("span", {}, "UAVs on their way home may get tasks again"), parts.recall)),
+    h("section", { class: "card" }, h("h3", {}, "Areas"), parts.areas,
+      h("p", { class: "actions" }, h("button", { type: "button", onclick: discover }, "Add an area"))),
+    h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void again(); } },
+      h("h3", {}, "A new plan"),
+      h("label", { class: "row" }, h("span", {}, "Algorithm"), parts.algorithm),
+      h("label", { class: "row" }, h("span", {}, "Time limit, s"), parts.limit),
+      h("p", { class: "actions" }, parts.start, " ", parts.stop),
+      parts.status));
+  root.append(h("h2", {}, "In the field"), parts.empty, parts.body);
+  subscribe(["answer", "answerProblem"], () => { if (get().view === "field") begin(); });
+  subscribe(["algorithms"], algorithms);
+  algorithms();
+}
+
+function algorithms() {
+  const names = get().algorithms.map(({ name }) => name);
+  const kept = parts.algorithm.value;
+  parts.algorithm.replaceChildren(...names.map((name) => h("option", { value: name }, name)));
+  parts.algorithm.value = [kept, "auto", "transfer_qmix", names[0]].find((name) => names.includes(name)) ?? "";
+}
+
+function show() {
+  begin();
+}
+
+function hide() {
+  halt();
+  map.showPlan(null);
+}
+
+/** Take the answer on screen as the mission, from its beginning. */
+function begin() {
+  const { answer } = get();
+  if (answer !== known) {
+    halt();
+    known = answer;
+    clock = 0;
+    lost = new Set();
+    happened = new Map();
+    found = [];
+  }
+  parts.empty.hidden = Boolean(answer);
+  parts.body.hidden = !answer;
+  if (answer) draw();
+  else parts.dock.replaceChildren();
+}
+
+function mission() {
+  const { answer, answerProblem } = get();
+  return { answer, problem: answerProblem };
+}
+
+function moveTo(time) {
+  const { answer, problem } = mission();
+  clock = Math.min(Math.max(0, time || 0), missionEnd(problem, answer));
+  draw();
+}
+
+function step(way) {
+  const { answer, problem } = mission();
+  const all = moments(problem, answer);
+  const next = way > 0 ? all.find((at) => at > clock + 1e-9) : all.findLast((at) => at < clock - 1e-9);
+  if (next !== undefined) moveTo(next);
+}
+
+function toggle() {
+  if (ticking) halt();
+  else {
+    const { answer, problem } = mission();
+    const end = missionEnd(problem, answer);
+    if (clock >= end) clock = 0;
+    parts.run.textContent = "Halt";
+    ticking = setInterval(() => {
+      moveTo(clock + end / FRAMES);
+      if (clock >= end) halt();
+    }, 50);
+  }
+}
+
+function halt() {
+  clearInterval(ticking);
+  ticking = null;
+  if (parts) parts.run.textContent = "Let it run";
+}
+
+/** The problem at the moment, with what has happened. */
+function present() {
+  const { answer, problem } = mission();
+  const at = problemAt(problem, answer, clock, { lost, recall: parts.recall.checked });
+  return { ...at, targets: [...at.targets.map((target) => ({ ...target, ...happened.get(target.id) })), ...found] };
+}
+
+function draw() {
+  const { answer, problem } = mission();
+  const end = missionEnd(problem, answer);
+  parts.time.max = String(end);
+  parts.time.value = String(clock);
+  parts.exact.max = String(end);
+  parts.exact.value = String(Number(clock.toPrecision(6)));
+  parts.shown.textContent = `${shown(clock)} of ${shown(end)}${problem.crs === "wgs84" ? " h" : ""}`;
+  const now = present();
+  drawUavs(now);
+  if (!parts.areas.contains(document.activeElement)) drawAreas(now);
+  drawMap(now);
+  drawOutcome();
+}
+
+function drawMap(now) {
+  const { answer, problem } = mission();
+  const rest = remainder(problem, answer, clock, lost);
+  const coming = new Map();
+  for (const { stops } of rest)
+    for (const { target_id: id, delivered } of stops)
+      coming.set(id, delivered.map((amount, k) => amount + (coming.get(id)?.[k] ?? 0)));
+  const unmet = now.targets
+    .map(({ id, loadlist }) => ({ target_id: id, remaining: loadlist.map((need, k) => Math.max(0, need - (coming.get(id)?.[k] ?? 0))) }))
+    .filter(({ remaining }) => remaining.some((amount) => amount > 1e-9));
+  map.showPlan(now, { routes: rest, unmet });
+}
+
+function drawUavs(now) {
+  const { answer, problem } = mission();
+  const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
+  parts.uavs.replaceChildren(
+    h("table", { "data-testid": "field-uavs" },
+      h("thead", {}, h("tr", {}, ["UAV", "Doing", "Range left", "Load", "Lost"].map((title) => h("th", { scope: "col" }, title)))),
+      h("tbody", {}, problem.uavs.map((uav, i) => {
+        const is = uavAt(problem, answer, i, clock);
+        const doing = { flying: `to ${is.next}`, unloading: `at ${is.next}` }[is.doing] ?? is.doing;
+        const gone = lost.has(uav.id);
+        return h("tr", { class: gone ? "lost" : null, "data-uav": uav.id },
+          h("th", { scope: "row" }, uav.id),
+          h("td", {}, gone ? "lost" : doing),
+          h("td", { class: "n" }, gone ? "–" : number(uav.voyage - is.flown)),
+          h("td", { class: "n" }, gone ? "–" : left.get(uav.id).loadlist.map((amount) => shown(amount)).join(" · ")),
+          h("td", {}, h("input", {
+            type: "checkbox", "aria-label": `${uav.id} is lost`, checked: gone,
+            onchange: (event) => { lost = new Set(lost); lost[event.target.checked ? "add" : "delete"](uav.id); draw(); },
+          })));
+      }))));
+}
+
+function drawAreas(now) {
+  const fresh = new Set(found.map(({ id }) => id));
+  parts.areas.replaceChildren(
+    h("table", { "data-testid": "field-areas" },
+      h("thead", {}, h("tr", {}, ["Area", "Level", "Still needed", ""].map((title) => h("th", { scope: "col" }, title)))),
+      h("tbody", {}, now.targets.map((target) =>
+        h("tr", { class: fresh.has(target.id) ? "new" : happened.has(target.id) ? "changed" : null, "data-area": target.id },
+          h("th", { scope: "row" }, target.id,
+            fresh.has(target.id) && h("span", { class: "place" }, field(target, "x", "x"), field(target, "y", "y"))),
+          h("td", {}, field(target, "level", "level")),
+          h("td", { class: "amounts" }, target.loadlist.map((amount, k) =>
+            amountField(target, amount, k))),
+          h("td", {}, fresh.has(target.id)
+            ? h("button", { type: "button", class: "quiet", onclick: () => { found = found.filter(({ id }) => id !== target.id); redraw(); } }, "Remove")
+            : happened.has(target.id) && h("button", { type: "button", class: "quiet", onclick: () => { happened.delete(target.id); redraw(); } }, "Undo")))))));
+}
+
+function redraw() {
+  document.activeElement?.blur?.();
+  draw();
+}
+
+function field(target, name, what) {
+  return h("input", {
+    type: "number", step: "any", value: String(target[name]), "aria-label": `${what} of ${target.id}`,
+    onchange: (event) => changed(target, { [name]: Number(event.target.value) }),
+  });
+}
+
+function amountField(target, amount, k) {
+  return h("input", {
+    type: "number", step: "any", min: "0", value: String(Number(amount.toPrecision(12))), "aria-label": `need ${k + 1} of ${target.id}`,
+    onchange: (event) => {
+      const loadlist = present().targets.find(({ id }) => id === target.id).loadlist.slice();
+      loadlist[k] = Number(event.target.value);
+      changed(target, { loadlist });
+    },
+  });
+}
+
+function changed(target, fields) {
+  if (found.some(({ id }) => id === target.id)) found = found.map((each) => (each.id === target.id ? { ...each, ...fields } : each));
+  else happened.set(target.id, { ...happened.get(target.id), ...fields });
+  redraw();
+}
+
+/** A new area in the middle of the others; its place, level and needs are to be filled in. */
+function discover() {
+  const { targets } = present();
+  const middle = (name) => targets.reduce((total, target) => total + target[name], 0) / targets.length;
+  let n = targets.length + 1;
+  while (targets.some(({ id }) => id === `area-${n}`)) n += 1;
+  const level = Math.max(...targets.map((target) => target.level));
+  const loadlist = targets[0].loadlist.map((_, k) => Math.max(...mission().problem.targets.map((target) => target.loadlist[k])));
+  found = [...found, { id: `area-${n}`, x: Number(middle("x").toFixed(6)), y: Number(middle("y").toFixed(6)), level, loadlist }];
+  redraw();
+}
+
+async function again() {
+  halt();
+  const { answer, problem } = mission();
+  const now = present();
+  if (!now.uavs.length) {
+    notify("Every UAV is lost: nobody is left to fly.", "error");
+    return;
+  }
+  const rest = remainder(problem, answer, clock, lost);
+  stopping = new AbortController();
+  parts.start.disabled = true;
+  parts.stop.disabled = false;
+  parts.status.textContent = "Allocating …";
+  try {
+    const given = await allocate(
+      { ...now, algorithm: parts.algorithm.value, time_limit_s: Number(parts.limit.value) },
+      {
+        signal: stopping.signal,
+        onProgress: ({ best_reward: reward }) => {
+          if (reward !== null && reward !== undefined) parts.status.textContent = `Best so far: reward ${shown(reward)}.`;
+        },
+      });
+    if (given) {
+      outcome = { answer: given, difference: changes(now, rest, given), at: clock };
+      known = given;
+      const { past } = get();
+      parts.status.textContent = `A new plan from ${shown(clock)} on: reward ${shown(given.reward)}. Undo goes back to the mission before.`;
+      clock = 0;
+      lost = new Set();
+      happened = new Map();
+      found = [];
+      set({ problem: now, past: [...past, get().problem], future: [], answer: given, answerProblem: now, incumbent: null, selection: null });
+      begin();
+    } else parts.status.textContent = "Stopped before there was a plan.";
+  } catch (error) {
+    if (error instanceof ApiError) set({ violations: error.violations });
+    parts.status.textContent = error.message;
+    notify(error.message, "error");
+  } finally {
+    parts.start.disabled = false;
+    parts.stop.disabled = true;
+  }
+}
+
+/** What the newest plan changed, as long as it is the mission on screen. */
+function drawOutcome() {
+  if (!outcome || outcome.answer !== get().answer) {
+    parts.dock.replaceChildren();
+    return;
+  }
+  const { difference, answer } = outcome;
+  const list = (ids) => (ids.length ? ids.join(" → ") : "home");
+  const percent = (share) => (share === null ? "–" : `${Math.round(100 * share)} %`);
+  const gained = answer.reward - difference.kept.reward;
+  const moved = difference.areas.filter(({ before, after }) => Math.abs((before ?? 0) - (after ?? 0)) > 1e-6);
+  parts.dock.replaceChildren(
+    h("section", { class: "difference", "data-testid": "field-changes" },
+      h("h3", {}, "What the new plan changes"),
+      h("p", {}, "Going on with the old plan would earn ", number(difference.kept.reward), ", the new one earns ",
+        number(answer.reward), " (", h("strong", {}, `${gained >= 0 ? "+" : ""}${shown(gained)}`), ")."),
+      h("div", { class: "two" },
+        h("table", {},
+          h("thead", {}, h("tr", {}, ["UAV", "Before", "Now", ""].map((title) => h("th", { scope: "col" }, title)))),
+          h("tbody", {}, difference.routes.filter((route) => route.before.length || route.after.length).map((route) =>
+            h("tr", { "data-uav": route.uav_id, class: route.kind },
+              h("th", { scope: "row" }, route.uav_id), h("td", {}, list(route.before)),
+              h("td", {}, route.kind === "lost" ? "–" : list(route.after)), h("td", {}, h("span", { class: "chip" }, route.kind)))))),
+        h("table", {},
+          h("thead", {}, h("tr", {}, ["Area", "Met before", "Met now"].map((title) => h("th", { scope: "col" }, title)))),
+          h("tbody", {}, moved.length
+            ? moved.map((area) => h("tr", { "data-area": area.target_id },
+              h("th", { scope: "row" }, area.target_id), h("td", { class: "n" }, percent(area.before)), h("td", { class: "n" }, percent(area.after))))
+            : h("tr", {}, h("td", { colspan: "3" }, "Every area gets what it would have got.")))))));
+}

@@ -1,0 +1,114 @@
+/** Plans to take away: flight files, GeoJSON, a table, a page to print. */
+
+import { address, ApiError, send } from "../api.js";
+import { download, h, notify } from "../dom.js";
+import { registerView } from "../registry.js";
+import { get, subscribe } from "../state.js";
+
+const DELIVERIES = [
+  ["payload-place", "Place the payload (NAV_PAYLOAD_PLACE)"],
+  ["servo", "Move a servo (DO_SET_SERVO)"],
+  ["gripper", "Open a gripper (DO_GRIPPER)"],
+  ["land", "Land and take off again"],
+  ["none", "Only fly there"],
+];
+const FILES = [
+  ["qgc-plan", "QGroundControl .plan"],
+  ["qgc-wpl", "Waypoints, QGC WPL 110"],
+];
+const DOCUMENTS = [
+  ["geojson", "GeoJSON of the whole plan"],
+  ["csv", "Table of all stops, CSV"],
+  ["html", "Page to print, saved"],
+];
+
+let parts = null;
+
+registerView({ id: "take-away", title: "Take away", order: 70, layout: "panel", mount, show: draw });
+
+function mount(root) {
+  const choice = (name, options) =>
+    h("select", { name, onchange: draw }, options.map(([value, text]) => h("option", { value }, text)));
+  const figure = (name, value, min, max, step = "any") => h("input", { name, type: "number", value, min, max, step, required: true });
+  parts = {
+    uav: h("select", { name: "uav" }),
+    rows: new Map(),
+    form: h("form", { class: "take", onsubmit: (event) => event.preventDefault() }),
+    state: h("p", { class: "muted", role: "status", "data-testid": "take-status" }),
+    flight: h("p", { class: "actions" }, FILES.map(([format, text]) =>
+      h("button", { type: "button", class: "primary", dataset: { format }, onclick: () => void take(format) }, text))),
+    documents: h("p", { class: "actions" },
+      DOCUMENTS.map(([format, text]) =>
+        h("button", { type: "button", dataset: { format }, onclick: () => void take(format) }, text)),
+      h("a", { class: "button", target: "_blank", rel: "noopener", "data-testid": "print" }, "Open the page to print")),
+  };
+  const row = (text, control, only = null) => {
+    const made = h("label", { class: "row" }, h("span", {}, text), control, h("span", { class: "error", role: "alert" }));
+    parts.rows.set(control.name, { made, control, only });
+    return made;
+  };
+  parts.form.append(
+    row("UAV", parts.uav),
+    row("Altitude, m", figure("altitude", "50", "1", "10000")),
+    row("Measured from", choice("altitude_reference", [["home", "the starting point"], ["terrain", "the ground below"]])),
+    row("Delivery", choice("delivery", DELIVERIES)),
+    row("It may descend, m (0: no limit)", figure("max_descent", "0", "0", "1000"), "payload-place"),
+    row("Servo output", figure("servo_channel", "9", "1", "32", "1"), "servo"),
+    row("Pulse width, µs", figure("servo_pwm", "1900", "500", "2500", "1"), "servo"),
+    row("Gripper", figure("gripper", "1", "1", "8", "1"), "gripper"),
+    row("After the last stop", choice("end", [["return", "return to launch"], ["land", "land there"]])));
+  root.append(
+    h("h2", {}, "Take it away"),
+    parts.state,
+    h("section", { class: "card" }, h("h3", {}, "Flight files"), parts.form, parts.flight),
+    h("section", { class: "card" }, h("h3", {}, "The whole plan"), parts.documents));
+  subscribe(["answer", "answerProblem"], draw);
+  draw();
+}
+
+function draw() {
+  const { answer, answerProblem } = get();
+  const delivery = parts.rows.get("delivery").control.value;
+  for (const { made, only } of parts.rows.values()) made.hidden = only !== null && only !== delivery;
+  const kept = parts.uav.value;
+  const flying = answer ? answer.routes.filter((route) => route.stops.length || route.return_distance > 0) : [];
+  parts.uav.replaceChildren(
+    h("option", { value: "" }, `all ${flying.length} that fly (ZIP)`),
+    ...flying.map((route) => h("option", { value: route.uav_id }, route.uav_id)));
+  if (flying.some((route) => route.uav_id === kept)) parts.uav.value = kept;
+  const geographic = answerProblem?.crs === "wgs84";
+  for (const button of parts.flight.children) button.disabled = !answer || !geographic;
+  for (const button of parts.documents.querySelectorAll("button")) button.disabled = !answer;
+  const link = parts.documents.querySelector("a");
+  link.hidden = !answer;
+  if (answer) link.href = address(`jobs/${answer.job_id}/plan?format=html`);
+  parts.state.textContent = !answer
+    ? "Allocate first: there is no plan yet."
+    : geographic
+      ? `${flying.length} of ${answer.routes.length} UAVs fly in this plan.`
+      : "This problem's crs is local; flight files need wgs84 (longitudes and latitudes). The other files have the local x and y.";
+}
+
+async function take(format) {
+  const { answer } = get();
+  const asked = new URLSearchParams({ format });
+  const flight = FILES.some(([name]) => name === format);
+  for (const { control, made } of parts.rows.values()) {
+    made.querySelector(".error").textContent = "";
+    if (flight && !made.hidden && control.value !== "") asked.set(control.name, control.value);
+  }
+  try {
+    const response = await send(`jobs/${answer.job_id}/plan?${asked}`);
+    const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? `plan.${format}`;
+    download(name, await response.blob());
+    parts.state.textContent = `${name} was checked and saved.`;
+  } catch (error) {
+    if (!(error instanceof ApiError)) throw error;
+    for (const { parameter, detail } of error.violations) {
+      const row = parts.rows.get(parameter);
+      if (row) row.made.querySelector(".error").textContent = detail;
+    }
+    parts.state.textContent = error.message;
+    notify(error.message, "error");
+  }
+}

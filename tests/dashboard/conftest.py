@@ -1,0 +1,84 @@
+"""A browser on the dashboard of a real service, which has a folder and a port of its own."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from live_service import LiveService
+from playwright.sync_api import Browser, Page, sync_playwright
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--no-first-run",
+    "--disable-component-update",
+    "--disable-sync",
+)
+HOW_TO_GET_ONE = (
+    f"no Chromium at {CHROMIUM}: 'apt-get install chromium', or its path in the variable CHROMIUM "
+    "(REQUIRE_BROWSER=1 makes this a failure)"
+)
+PATIENCE_MS = 20_000
+
+
+def pytest_collection_modifyitems(items):
+    if Path(CHROMIUM).exists() or os.environ.get("REQUIRE_BROWSER") == "1":
+        return
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents and "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.skip(reason=HOW_TO_GET_ONE))
+
+
+@contextmanager
+def browsing() -> Iterator[Browser]:
+    """Start Debian's Chromium, with nothing of it that calls home."""
+    if not Path(CHROMIUM).exists():
+        raise FileNotFoundError(HOW_TO_GET_ONE)
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=list(ARGUMENTS))
+        try:
+            yield started
+        finally:
+            started.close()
+
+
+@pytest.fixture(scope="session")
+def service(tmp_path_factory) -> Iterator[LiveService]:
+    running = LiveService(tmp_path_factory.mktemp("dashboard"), workers=1).start()
+    try:
+        yield running.await_ready()
+    finally:
+        running.stop()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with browsing() as started:
+        yield started
+
+
+@pytest.fixture
+def page(browser, service) -> Iterator[Page]:
+    """The dashboard, open; at the end nothing may have gone wrong in it, and nothing left the machine."""
+    context = browser.new_context(viewport={"width": 1366, "height": 900}, accept_downloads=True)
+    context.set_default_timeout(PATIENCE_MS)
+    opened = context.new_page()
+    troubles = []
+    opened.on("console", lambda said: troubles.append(said.text) if said.type == "error" else None)
+    opened.on("pageerror", lambda error: troubles.append(str(error)))
+    asked = []
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.expected_troubles = []
+    opened.goto(service.url)
+    yield opened
+    context.close()
+    unexpected = [text for text in troubles if not any(known in text for known in opened.expected_troubles)]
+    assert unexpected == []
+    elsewhere = [url for url in asked if not url.startswith((service.url, "data:", "blob:"))]
+    assert elsewhere == []
