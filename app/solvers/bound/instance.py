@@ -1,0 +1,64 @@
+"""A problem as the bounds see it: deliveries as shares of a need, rewards in units of the largest level."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.domain.problem import Problem
+from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
+
+
+class Instance(NamedTuple):
+    """One problem, scaled.
+
+    Attributes
+    ----------
+    arrays
+        A stack of one problem, as the simulator has it.
+    scale
+        Reward that one unit stands for here, > 0.
+    worth
+        (N, K) what meeting the whole need of a material at a target earns.
+    need
+        (N, K) amounts needed.
+    load
+        (M, K) amounts carried.
+    price
+        Cost of a unit of distance, λ / scale.
+    idle
+        (M,) what a UAV earns that visits nothing: 0, or less where its way home is charged.
+    useful
+        (M, N) targets at which a UAV that does not return could unload something.
+    """
+
+    arrays: ProblemArrays
+    scale: float
+    worth: Floats
+    need: Floats
+    load: Floats
+    price: float
+    idle: Floats
+    useful: Flags
+
+
+def new_instance(problem: Problem) -> Instance:
+    """Scale a problem."""
+    arrays = compile_problem(problem)
+    need, load, level = arrays.need[0], arrays.load[0], arrays.level[0]
+    wanted = arrays.need_total[0] > 0
+    scale = float(level[wanted].max(initial=0.0))
+    scale = scale if scale > 0 else 1.0
+    share = need / np.where(wanted, arrays.need_total[0], 1.0)[:, None]
+    price = float(arrays.weight[0]) / scale
+    out = ~arrays.ret[0]
+    charged = out & bool(arrays.charge_return[0])
+    useful = out[:, None] & ((load[:, None, :] > 0) & (need[None, :, :] > 0)).any(axis=2)
+    idle = np.where(charged, -price * arrays.start_home[0], 0.0)
+    return Instance(arrays, scale, (level / scale)[:, None] * share, need, load, price, idle, useful)
+
+
+def safely(value: float, magnitude: float) -> float:
+    """Round a sum of at most some 10^7 terms of a total `magnitude` up by more than its rounding error."""
+    return value + 1e-9 * magnitude
