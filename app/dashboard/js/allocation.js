@@ -1,0 +1,70 @@
+/** One allocation at a time: sent as a job, followed by its events, cancelled with its best plan kept. */
+
+import { ApiError, follow, json } from "./api.js";
+import { notify } from "./dom.js";
+import { get, set } from "./state.js";
+
+/** The request for the problem on screen. An objective that is the API's default is left out. */
+export function requestOf(problem, how) {
+  return { ...problem, ...how };
+}
+
+/**
+ * Allocate the problem on screen; the store's `job`, `incumbent` and at the end `answer` follow it.
+ * @param {object} how algorithm, parameters, seed, time_limit_s and what else `POST /allocate` takes
+ */
+export async function allocate(how) {
+  const { problem } = get();
+  set({ violations: [], answer: null, answerProblem: null, incumbent: null, job: { id: null, status: "sending", algorithm: how.algorithm, fraction: 0, epoch: null, best_reward: null, trace: [], startedAt: performance.now() } });
+  try {
+    const job = await json("allocate", { method: "POST", body: requestOf(problem, how), headers: { Prefer: "respond-async" } });
+    take({ id: job.id, status: job.status });
+    await follow(job.id, (_, progress) => onProgress(problem, progress));
+    end(problem, await json(`jobs/${job.id}`));
+  } catch (error) {
+    take({ status: "failed" });
+    set({ incumbent: null, violations: error.violations ?? [] });
+    const wait = error instanceof ApiError && error.retryAfter ? ` Try again in ${error.retryAfter} s.` : "";
+    notify(`${error.message}.${wait}`.replace("..", "."), "error");
+  }
+}
+
+/** Stop the running job; what it has found so far becomes the answer. */
+export async function cancel() {
+  const { job } = get();
+  if (!job?.id) return;
+  take({ status: "stopping" });
+  try {
+    await json(`jobs/${job.id}`, { method: "DELETE" });
+  } catch (error) {
+    notify(error.message, "error");
+  }
+}
+
+/** Whether a job is under way. */
+export function running(job) {
+  return job !== null && ["sending", "queued", "running", "stopping"].includes(job.status);
+}
+
+function take(fields) {
+  set({ job: { ...get().job, ...fields } });
+}
+
+function onProgress(problem, progress) {
+  const { job, incumbent } = get();
+  const { fraction, epoch, best_reward, assignment } = progress;
+  const rose = best_reward !== null && best_reward !== job.trace.at(-1)?.reward;
+  const point = { t: (performance.now() - job.startedAt) / 1000, epoch, reward: best_reward };
+  const status = job.status === "stopping" ? "stopping" : (progress.status ?? "running");
+  take({ status, fraction, epoch, best_reward, trace: rose ? [...job.trace, point] : job.trace });
+  if (assignment && JSON.stringify(assignment) !== JSON.stringify(incumbent?.assignment)) set({ incumbent: { problem, assignment } });
+}
+
+function end(problem, job) {
+  const { trace, startedAt } = get().job;
+  const last = { t: (performance.now() - startedAt) / 1000, epoch: job.progress.epoch, reward: job.result?.reward ?? null };
+  take({ status: job.status, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
+  set({ incumbent: null, answer: job.result, answerProblem: job.result && problem, violations: job.error?.errors ?? [] });
+  if (job.error) notify(job.error.detail, "error");
+  else if (!job.result) notify("The job was cancelled before it had a plan");
+}

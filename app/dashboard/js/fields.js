@@ -1,0 +1,94 @@
+/** Form fields made from JSON schemas, as the service describes its parameters. */
+
+import { h } from "./dom.js";
+
+/**
+ * Fields of an object's schema.
+ * @param {Record<string, object>} properties JSON schemas by name
+ * @param {{pointer: string, values?: object, defs?: object, onchange?: () => void}} options
+ *   pointer is the JSON pointer of the object in the request, by which refusals find the field
+ */
+export class Fields {
+  constructor(properties, { pointer, values = {}, defs = {}, onchange = () => {} }) {
+    this.fields = Object.entries(properties).map(([name, schema]) => makeField(name, resolved(schema, defs), `${pointer}/${name}`, values[name], onchange));
+    this.element = h("div", { class: "fields" }, this.fields.map((field) => field.element));
+  }
+
+  /** What was filled in, without what is the default anyway. */
+  values() {
+    return Object.fromEntries(this.fields.map((field) => [field.name, field.read()]).filter(([, value]) => value !== undefined));
+  }
+}
+
+/** Show refusals at the fields of a form; return those that belong to none of them. */
+export function showViolations(root, violations) {
+  for (const place of root.querySelectorAll("[data-pointer]")) setError(place, null);
+  return violations.filter(({ pointer, detail }) => {
+    const place = root.querySelector(`[data-pointer="${CSS.escape(pointer)}"]`);
+    if (place) setError(place, detail);
+    return !place;
+  });
+}
+
+function setError(place, detail) {
+  const input = place.querySelector("input, select");
+  const shown = place.querySelector(".error");
+  input.toggleAttribute("aria-invalid", Boolean(detail));
+  if (detail) input.setAttribute("aria-invalid", "true");
+  shown.textContent = detail ?? "";
+  shown.hidden = !detail;
+}
+
+/** A labelled place for an input, where a refusal of its pointer is shown. */
+export function labelled(title, input, { pointer, hint } = {}) {
+  const id = `error-${pointer?.replaceAll("/", "-")}`;
+  input.setAttribute("aria-describedby", id);
+  return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
+}
+
+/** Take out references and the null of what may be left open. */
+function resolved(schema, defs) {
+  const found = schema.$ref ? { ...defs[schema.$ref.split("/").at(-1)], ...schema } : schema;
+  const open = found.anyOf?.filter((each) => each.type !== "null");
+  return open?.length ? { ...found, ...resolved(open[0], defs), nullable: true, default: found.default, description: found.description } : found;
+}
+
+function makeField(name, schema, pointer, value, onchange) {
+  const given = value ?? schema.default;
+  const input = inputFor(schema, given);
+  input.name = name;
+  input.addEventListener("change", onchange);
+  const element = labelled(name.replaceAll("_", " "), input, { pointer, hint: [schema.description, range(schema)].filter(Boolean).join(". ") });
+  return { name, element, read: () => valueOf(schema, input) };
+}
+
+function inputFor(schema, given) {
+  const choices = schema.enum ?? (schema.type === "boolean" ? [true, false] : null);
+  if (choices) {
+    const shown = [...(schema.nullable ? [["", "by itself"]] : []), ...choices.map((each) => [String(each), { true: "yes", false: "no" }[String(each)] ?? each])];
+    return h("select", {}, shown.map(([value, text]) => h("option", { value, selected: value === String(given ?? "") }, text)));
+  }
+  const numeric = schema.type === "number" || schema.type === "integer";
+  return h("input", {
+    type: "text", inputmode: numeric ? "decimal" : null, autocomplete: "off", spellcheck: "false",
+    value: given === null || given === undefined ? "" : String(given), placeholder: schema.nullable ? "by itself" : null,
+  });
+}
+
+/** The value as JSON; what is no number goes as it is, so that the service says what is wrong with it. */
+function valueOf(schema, input) {
+  const text = input.value.trim();
+  if (text === "") return undefined;
+  let value = text;
+  if (schema.type === "boolean") value = text === "true";
+  else if ((schema.type === "number" || schema.type === "integer") && Number.isFinite(Number(text))) value = Number(text);
+  return value === schema.default ? undefined : value;
+}
+
+function range({ minimum, maximum, exclusiveMinimum, type }) {
+  if (type !== "number" && type !== "integer") return "";
+  const low = minimum ?? exclusiveMinimum;
+  if (low === undefined && maximum === undefined) return "";
+  if (maximum === undefined) return exclusiveMinimum === undefined ? `At least ${low}` : `More than ${low}`;
+  return `${exclusiveMinimum === undefined ? "" : "More than "}${low} to ${maximum}`;
+}

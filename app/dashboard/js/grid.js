@@ -1,0 +1,151 @@
+/** An editable table that is used from the keyboard like a spreadsheet. */
+
+import { h, shown } from "./dom.js";
+
+/** A table of UAVs or areas, a row each. */
+export class Grid {
+  /**
+   * @param {{label: string, kind: string, onEdit: (id: string, column: object, text: string) => void,
+   *   onSelect: (id: string) => void, onDelete: (id: string) => void}} options
+   */
+  constructor(options) {
+    this.options = options;
+    this.rows = new Map();
+    this.items = [];
+    this.columns = [];
+    this.head = h("tr", { role: "row" });
+    this.body = h("tbody", { role: "rowgroup" });
+    this.element = h("table", { role: "grid", "aria-label": options.label, class: "grid", dataset: { kind: options.kind } }, h("thead", { role: "rowgroup" }, this.head), this.body);
+    this.body.addEventListener("click", (event) => this.#onClick(event));
+    this.body.addEventListener("dblclick", (event) => this.#edit(event.target.closest("td")));
+    this.body.addEventListener("keydown", (event) => this.#onKey(event));
+  }
+
+  /**
+   * Show items; rows of items that did not change are kept.
+   * @param {object[]} items
+   * @param {{name: string, title: string, read: (item: object) => any, optional?: boolean}[]} columns
+   */
+  show(items, columns) {
+    const sameColumns = columns.map((c) => c.name).join() === this.columns.map((c) => c.name).join();
+    if (!sameColumns) {
+      this.rows.clear();
+      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", title: column.hint }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "hint" }, "")));
+    }
+    this.columns = columns;
+    this.items = items;
+    const kept = new Map();
+    for (const item of items) {
+      const known = this.rows.get(item.id);
+      kept.set(item.id, known?.item === item ? known : { item, element: this.#row(item) });
+    }
+    const had = document.activeElement?.closest?.("table") === this.element ? this.#place(document.activeElement.closest("td")) : null;
+    this.rows = kept;
+    this.body.replaceChildren(...[...kept.values()].map(({ element }) => element));
+    const first = this.body.querySelector("td");
+    if (first && !this.body.querySelector('td[tabindex="0"]')) first.tabIndex = 0;
+    if (had) this.focus(Math.min(had.row, items.length - 1), had.column);
+  }
+
+  /** Mark the selected row and the cells that the service refuses. @param {Map<string, string>} faults by `row/column` */
+  mark(selected, faults = new Map()) {
+    for (const [id, { element }] of this.rows) element.setAttribute("aria-selected", String(id === selected));
+    for (const cell of this.body.querySelectorAll("[aria-invalid]")) {
+      cell.removeAttribute("aria-invalid");
+      cell.removeAttribute("title");
+    }
+    for (const [key, detail] of faults) {
+      const cut = key.indexOf("/");
+      const [row, name] = [key.slice(0, cut), key.slice(cut + 1)];
+      const cell = this.body.rows[Number(row)]?.querySelector(`td[data-column="${CSS.escape(name)}"]`);
+      cell?.setAttribute("aria-invalid", "true");
+      if (cell) cell.title = detail;
+    }
+  }
+
+  /** Go to a cell. */
+  focus(row, column) {
+    const cell = this.body.rows[row]?.cells[column];
+    if (!cell) return;
+    for (const other of this.body.querySelectorAll('td[tabindex="0"]')) other.tabIndex = -1;
+    cell.tabIndex = 0;
+    cell.focus();
+    cell.scrollIntoView({ block: "nearest", inline: "nearest" });
+  }
+
+  /** Bring a row into sight. */
+  reveal(id) {
+    this.rows.get(id)?.element.scrollIntoView({ block: "nearest" });
+  }
+
+  #row(item) {
+    const cells = this.columns.map((column) => {
+      const value = column.read(item);
+      return h("td", { role: "gridcell", tabindex: "-1", class: typeof value === "number" ? "num" : null, dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
+    });
+    const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": `Delete ${item.id}`, title: `Delete ${item.id}` }, "×");
+    return h("tr", { role: "row", dataset: { id: item.id } }, cells, h("td", { role: "gridcell", tabindex: "-1" }, remove));
+  }
+
+  #place(cell) {
+    return { row: cell.parentElement.sectionRowIndex, column: cell.cellIndex };
+  }
+
+  #onClick(event) {
+    const row = event.target.closest("tr");
+    if (!row) return;
+    if (event.target.closest("button")) this.options.onDelete(row.dataset.id);
+    else this.options.onSelect(row.dataset.id);
+  }
+
+  #onKey(event) {
+    const cell = event.target.closest("td");
+    if (event.target.tagName === "INPUT") return;
+    const { row, column } = this.#place(cell);
+    const step = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key];
+    if (step) {
+      event.preventDefault();
+      this.focus(row + step[0], column + step[1]);
+      this.options.onSelect(document.activeElement.closest("tr")?.dataset.id);
+    } else if (event.key === "Enter" || event.key === "F2") {
+      event.preventDefault();
+      if (cell.dataset.column) this.#edit(cell);
+      else this.options.onDelete(cell.parentElement.dataset.id);
+    } else if (event.key === "Delete") {
+      this.options.onDelete(cell.parentElement.dataset.id);
+    } else if (event.key.length === 1 && !event.ctrlKey && !event.metaKey && !event.altKey && cell.dataset.column) {
+      event.preventDefault();
+      this.#edit(cell, event.key);
+    }
+  }
+
+  #edit(cell, typed = null) {
+    const column = this.columns.find((each) => each.name === cell?.dataset.column);
+    if (!column || cell.querySelector("input")) return;
+    const { id } = cell.parentElement.dataset;
+    const value = column.read(this.rows.get(id).item);
+    const before = value === undefined ? "" : String(value);
+    const was = [...cell.childNodes];
+    const { row, column: at } = this.#place(cell);
+    const input = h("input", { "aria-label": `${column.title} of ${id}`, value: typed ?? before, spellcheck: "false" });
+    let ended = false;
+    const end = (keep, back) => {
+      if (ended) return;
+      ended = true;
+      cell.replaceChildren(...was);
+      if (back) this.focus(row, at);
+      if (keep && input.value.trim() !== before) this.options.onEdit(id, column, input.value.trim());
+    };
+    input.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" || event.key === "Escape") {
+        event.preventDefault();
+        event.stopPropagation();
+        end(event.key === "Enter", true);
+      }
+    });
+    input.addEventListener("blur", () => end(true, false));
+    cell.replaceChildren(input);
+    input.focus();
+    if (typed === null) input.select();
+  }
+}

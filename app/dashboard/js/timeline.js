@@ -1,0 +1,52 @@
+/** A timeline a UAV: its legs, what it does at its stops, and the way home. */
+
+import { h, shown } from "./dom.js";
+import { hue } from "./plan.js";
+import { select } from "./state.js";
+
+/**
+ * Draw the timelines of an answer.
+ * @param {object} problem
+ * @param {object} answer
+ */
+export function timeline(problem, answer) {
+  const targets = new Map(problem.targets.map((target) => [target.id, target]));
+  const rows = problem.uavs.map((uav, index) => ({ uav, index, ...timesOf(uav, answer.routes[index], targets) })).filter(({ stops }) => stops.length);
+  const end = Math.max(0, ...rows.map(({ home }) => home)) || 1;
+  const share = (time) => `${(100 * time) / end}%`;
+  const bar = (kind, from, to, title) => {
+    const made = h("span", { class: kind, title });
+    made.style.left = share(from);
+    made.style.width = share(to - from);
+    return made;
+  };
+  const row = ({ uav, index, stops, home }) => {
+    const track = h("div", { class: "track" });
+    track.style.setProperty("--hue", hue(index));
+    stops.forEach((stop, n) => {
+      track.append(bar("leg", stop.left, stop.arrival, `to ${stop.id}`));
+      const at = bar("visit", stop.arrival, stop.done, `${n + 1}. ${stop.id} at ${shown(stop.arrival)}: ${stop.delivered.map((amount) => shown(amount)).join(", ")}`);
+      at.dataset.targetId = stop.id;
+      track.append(at);
+    });
+    track.append(bar("leg home", stops.at(-1).done, home, `home at ${shown(home)}`));
+    return h("li", { dataset: { uavId: uav.id } }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: uav.id }) }, uav.id), track);
+  };
+  const ticks = h("li", { class: "ticks", "aria-hidden": "true" }, h("span", {}, problem.crs === "wgs84" ? "hours" : "time"), h("div", { class: "track" }, [0, 0.25, 0.5, 0.75, 1].map((part) => {
+    const tick = h("span", { class: "tick" }, shown(part * end, 3));
+    tick.style.left = `${100 * part}%`;
+    return tick;
+  })));
+  return h("ol", { class: "timeline", "aria-label": "Timeline of each UAV" }, ticks, rows.map(row));
+}
+
+/** When a UAV leaves, arrives and is done at each stop, and when it is home. */
+function timesOf(uav, route, targets) {
+  let left = 0;
+  const stops = route.stops.map((stop) => {
+    const times = { id: stop.target_id, left, arrival: stop.arrival_time, done: stop.arrival_time + (targets.get(stop.target_id).service_time ?? 0), delivered: stop.delivered };
+    left = times.done;
+    return times;
+  });
+  return { stops, home: left + route.return_distance / uav.speed };
+}

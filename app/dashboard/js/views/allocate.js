@@ -1,0 +1,127 @@
+/** Allocate: algorithm, parameters and limits as the service describes them; the reward climbing live. */
+
+import { allocate, cancel, running } from "../allocation.js";
+import { json } from "../api.js";
+import { drawCurves } from "../curve.js";
+import { h, notify, number } from "../dom.js";
+import { Fields, labelled, showViolations } from "../fields.js";
+import { registerView } from "../registry.js";
+import { get, set, select, subscribe } from "../state.js";
+
+const PREFERRED = ["auto", "transfer_qmix"];
+const PROBLEM_FIELDS = new Set(["uavs", "targets", "max_steps", "crs", "objective"]);
+const OWN_FIELDS = new Set(["algorithm", "parameters"]);
+const FIRST_LIMIT_S = 5;
+const REDRAW_MS = 150;
+
+/** The form; returns it with a function that reads it. */
+function makeForm(schemas) {
+  const { algorithms } = get();
+  const names = algorithms.map(({ name }) => name);
+  const first = PREFERRED.find((name) => names.includes(name)) ?? names[0];
+  const choice = h("select", { name: "algorithm", onchange: () => choose() }, names.map((name) => h("option", { value: name, selected: name === first }, name)));
+  const summary = h("p", { class: "hint" });
+  const place = h("div", {});
+  const request = schemas.AllocationRequest.properties;
+  const rest = Object.fromEntries(Object.entries(request).filter(([name]) => !PROBLEM_FIELDS.has(name) && !OWN_FIELDS.has(name)));
+  const limits = new Fields(rest, { pointer: "", defs: schemas, values: { time_limit_s: FIRST_LIMIT_S } });
+  let parameters;
+  const choose = () => {
+    const algorithm = algorithms.find(({ name }) => name === choice.value);
+    summary.textContent = algorithm.summary;
+    parameters = new Fields(algorithm.parameters.properties ?? {}, { pointer: "/parameters", defs: algorithm.parameters.$defs });
+    place.replaceChildren(parameters.element);
+  };
+  choose();
+  const elsewhere = h("ul", { class: "violations", id: "violations" });
+  const start = h("button", { class: "primary", title: "Ctrl+Enter", id: "start" }, "Allocate");
+  const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
+  const form = h("form", { id: "allocate-form", class: "stack", novalidate: true },
+    labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element,
+    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place),
+    h("div", { class: "row" }, start, stop), elsewhere);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (!running(get().job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values() });
+  });
+  const enable = () => {
+    start.disabled = running(get().job);
+    stop.hidden = !start.disabled;
+  };
+  const refuse = () => {
+    const { violations } = get();
+    const others = showViolations(form, violations);
+    if (violations.some(({ pointer }) => pointer.startsWith("/parameters"))) form.querySelector("details").open = true;
+    elsewhere.replaceChildren(...others.map(violation));
+    form.querySelector("[aria-invalid]")?.focus();
+  };
+  subscribe(["job"], enable);
+  subscribe(["violations"], refuse);
+  enable();
+  return form;
+}
+
+/** A refusal of the problem itself, with the way to its field. */
+function violation({ pointer, detail }) {
+  const [, kind, at, field] = pointer.split("/");
+  const item = get().problem[kind]?.[Number(at)];
+  const go = () => {
+    if (item?.id) select({ kind, id: item.id });
+    set({ view: "problem" });
+    document.querySelector(`table[data-kind="${kind}"] tr:nth-child(${Number(at) + 1}) td[data-column^="${field}"]`)?.focus();
+  };
+  const where = item?.id ? `${item.id}, ${field ?? ""}` : pointer;
+  return h("li", { class: "error" }, h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where), ` ${detail}`);
+}
+
+/** How far the job is. */
+function makeProgress() {
+  const bar = h("progress", { max: "1", "aria-label": "Progress" });
+  const facts = h("dl", { class: "figures" });
+  const root = h("div", { class: "card", id: "progress", "aria-live": "off" }, h("div", { class: "row spread" }, h("h3", {}, "Job"), h("span", { class: "chip", id: "job-status" })), bar, facts);
+  const figure = (title, value) => h("div", { class: "figure" }, h("dt", {}, title), h("dd", {}, value));
+  const draw = ({ job }) => {
+    root.hidden = job === null;
+    if (!job) return;
+    root.querySelector("#job-status").textContent = job.status;
+    bar.value = job.fraction ?? 0;
+    facts.replaceChildren(figure("Best reward", number(job.best_reward)), figure("Epoch", number(job.epoch)), figure("Seconds", job.trace.length ? number(job.trace.at(-1).t, 3) : "–"));
+  };
+  subscribe(["job"], draw);
+  draw(get());
+  return root;
+}
+
+/** The reward against time, in the region below the map. */
+function makeChart(dock) {
+  const chart = h("div", { class: "chart", id: "reward-chart" });
+  let waiting = null;
+  const draw = () => {
+    waiting = null;
+    const { job } = get();
+    if (!job) return;
+    if (!dock.childElementCount) dock.append(chart);
+    const points = job.trace.filter(({ reward }) => reward !== null).map(({ t, reward }) => [t, reward]);
+    drawCurves(chart, [{ name: job.algorithm, points }], { x: "seconds", height: 170, label: `Reward against time, now ${job.best_reward}` });
+  };
+  const later = () => { waiting ??= setTimeout(draw, REDRAW_MS); };
+  subscribe(["job"], later);
+  return draw;
+}
+
+let redraw = () => {};
+
+registerView({
+  id: "allocate", title: "Allocate", order: 20, layout: "panel",
+  mount(root, { dock }) {
+    redraw = makeChart(dock);
+    json("openapi.json")
+      .then(({ components }) => root.append(makeForm(components.schemas), makeProgress()))
+      .catch((error) => notify(error.message, "error"));
+  },
+  show: () => redraw(),
+});
+
+subscribe(["answer"], ({ answer, view }) => {
+  if (answer && view === "allocate") set({ view: "answer" });
+});

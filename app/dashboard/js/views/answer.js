@@ -1,0 +1,93 @@
+/** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
+
+import { h, number, shown } from "../dom.js";
+import { hue, sum } from "../plan.js";
+import { registerView } from "../registry.js";
+import { get, select, set, subscribe } from "../state.js";
+import { timeline } from "../timeline.js";
+
+function figures(answer) {
+  const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight], ["Seconds", answer.elapsed_s, 3]];
+  return h("dl", { class: "figures", id: "figures" }, all.map(([title, value, digits]) => figure(title, value, digits)), boundFigures(answer.bound));
+}
+
+function figure(title, value, digits) {
+  return h("div", { class: "figure", dataset: { figure: title } }, h("dt", {}, title), h("dd", {}, number(value, digits)));
+}
+
+/** The proven bound and the gap to it, where the answer has them. */
+function boundFigures(bound) {
+  if (bound === null || bound === undefined) return [];
+  const facts = typeof bound === "number" ? { bound } : bound;
+  return Object.entries(facts).filter(([, value]) => typeof value === "number").map(([name, value]) => figure(name.replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase()), value));
+}
+
+function source(answer) {
+  const policy = answer.source_policy;
+  const how = `${answer.algorithm}, seed ${answer.seed}`;
+  if (!policy) return h("p", { class: "hint", id: "source" }, how);
+  return h("p", { class: "hint", id: "source" }, `${how}. Policy `, h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
+}
+
+function routeRows(problem, answer) {
+  const indices = new Map(problem.uavs.map((uav, index) => [uav.id, index]));
+  return answer.routes.filter((route) => route.stops.length).flatMap((route) =>
+    route.stops.map((stop, n) => {
+      const key = h("span", { class: "key", "aria-hidden": "true" });
+      key.style.setProperty("--hue", hue(indices.get(route.uav_id)));
+      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance), " + ", number(route.return_distance), " home")) : null;
+      return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
+        h("td", { class: "num" }, String(n + 1)), h("td", {}, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
+        h("td", { class: "num" }, stop.delivered.flatMap((amount, k) => [k ? ", " : null, number(amount)])));
+    }),
+  );
+}
+
+function routesTable(problem, answer) {
+  const head = ["UAV", "#", "Area", problem.crs === "wgs84" ? "Arrives, h" : "Arrives", "Unloads"];
+  const out = answer.routes.filter((route) => route.stops.length).length;
+  return h("details", { open: true }, h("summary", {}, `Routes of ${out} of ${problem.uavs.length} UAVs`),
+    h("div", { class: "scroll" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title) => h("th", { scope: "col" }, title)))), h("tbody", {}, routeRows(problem, answer)))));
+}
+
+function unmetList(problem, answer) {
+  const title = answer.unmet.length ? `Unmet needs of ${answer.unmet.length} of ${problem.targets.length} areas` : `All ${problem.targets.length} areas get all they need`;
+  const needs = new Map(problem.targets.map((target) => [target.id, sum(target.loadlist)]));
+  const item = (unmet) =>
+    h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
+      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "targets", id: unmet.target_id }) }, unmet.target_id), h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
+      h("p", {}, "lacks ", unmet.remaining.flatMap((amount, k) => [k ? ", " : null, number(amount)]), h("span", { class: "hint" }, ` of ${shown(needs.get(unmet.target_id))}`)),
+      h("p", { class: "hint" }, unmet.reason), typeof unmet.remedy === "string" && h("p", { class: "hint" }, unmet.remedy));
+  return h("details", { open: answer.unmet.length > 0 }, h("summary", {}, title), h("ul", { class: "unmet", id: "unmet" }, answer.unmet.map(item)));
+}
+
+registerView({
+  id: "answer", title: "Answer", order: 30, layout: "panel",
+  mount(root, { dock }) {
+    const stale = h("p", { class: "warning", id: "stale" }, "The problem was changed after this answer.");
+    const markStale = () => { stale.hidden = !get().answer || get().answerProblem === get().problem; };
+    const draw = () => {
+      const { answer, answerProblem } = get();
+      if (!answer) {
+        root.replaceChildren(h("p", { class: "hint" }, "No plan yet."), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, "Allocate")));
+        return dock.replaceChildren();
+      }
+      root.replaceChildren(stale, figures(answer), source(answer), routesTable(answerProblem, answer), unmetList(answerProblem, answer));
+      dock.replaceChildren(timeline(answerProblem, answer));
+      markSelection();
+    };
+    const markSelection = () => {
+      const { selection } = get();
+      for (const row of [...root.querySelectorAll("#routes tbody tr"), ...dock.querySelectorAll("li[data-uav-id]")]) {
+        const chosen = selection?.kind === "uavs" ? row.dataset.uavId === selection.id : selection !== null && row.dataset.targetId === selection.id;
+        row.classList.toggle("chosen", chosen);
+      }
+      root.querySelector("#routes tr.chosen")?.scrollIntoView({ block: "nearest" });
+    };
+    subscribe(["answer"], draw);
+    subscribe(["problem", "answerProblem"], markStale);
+    subscribe(["selection"], markSelection);
+    draw();
+    markStale();
+  },
+});
