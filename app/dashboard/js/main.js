@@ -35,8 +35,9 @@ function show(id) {
   byId("main").classList.toggle("paged", paged);
   byId("page").hidden = !paged;
   set({ view: view.id });
-  view.show?.();
   layOutDock();
+  if (!paged) map.resized();
+  view.show?.();
 }
 
 function mount(view) {

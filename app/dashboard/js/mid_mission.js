@@ -150,15 +150,17 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
   };
 }
 
-/** What is left of a plan after a moment, times counted from there; UAVs that are lost do nothing more. */
+/** What is left of a plan after a moment, times counted from there; UAVs that are lost do nothing more,
+ * and `dropped` is what they would have done. */
 export function remainder(problem, answer, time, lost = new Set()) {
   return answer.routes.map((route, i) => {
     const id = uavId(problem.uavs[i], i);
-    if (lost.has(id)) return { uav_id: id, lost: true, stops: [], distance: 0 };
     const now = uavAt(problem, answer, i, time);
-    const stops = route.stops.slice(now.done).map((stop) => ({ ...stop, arrival_time: stop.arrival_time - time }));
+    const dropped = route.stops.slice(now.done);
+    if (lost.has(id)) return { uav_id: id, lost: true, stops: [], dropped, distance: 0 };
+    const stops = dropped.map((stop) => ({ ...stop, arrival_time: stop.arrival_time - time }));
     const flown = now.flown - (problem.uavs[i].dis ?? 0);
-    return { uav_id: id, lost: false, stops, distance: stops.length ? Math.max(0, route.distance - flown) : 0 };
+    return { uav_id: id, lost: false, stops, dropped: [], distance: stops.length ? Math.max(0, route.distance - flown) : 0 };
   });
 }
 
@@ -172,7 +174,7 @@ export function remainder(problem, answer, time, lost = new Set()) {
 export function changes(now, before, answer) {
   const after = new Map(answer.routes.map((route) => [route.uav_id, route]));
   const routes = before.map((old) => {
-    const was = old.stops.map((stop) => stop.target_id);
+    const was = [...old.stops, ...old.dropped].map((stop) => stop.target_id);
     const is = (after.get(old.uav_id)?.stops ?? []).map((stop) => stop.target_id);
     const kind = old.lost ? "lost" : was.join("\n") === is.join("\n") ? "same" : "changed";
     return { uav_id: old.uav_id, before: was, after: is, kind };

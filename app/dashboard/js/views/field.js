@@ -51,13 +51,13 @@ function mount(root, context) {
       h("p", { class: "clock" }, parts.time, parts.exact, parts.shown),
       h("p", { class: "actions" }, parts.before, " ", parts.run, " ", parts.next)),
     h("section", { class: "card" }, h("h3", {}, "UAVs"), parts.uavs,
-      h("label", { class: "row" }, h("span", {}, "UAVs on their way home may get tasks again"), parts.recall)),
+      h("label", { class: "line" }, h("span", {}, "UAVs on their way home may get tasks again"), parts.recall)),
     h("section", { class: "card" }, h("h3", {}, "Areas"), parts.areas,
       h("p", { class: "actions" }, h("button", { type: "button", onclick: discover }, "Add an area"))),
     h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void again(); } },
       h("h3", {}, "A new plan"),
-      h("label", { class: "row" }, h("span", {}, "Algorithm"), parts.algorithm),
-      h("label", { class: "row" }, h("span", {}, "Time limit, s"), parts.limit),
+      h("label", { class: "line" }, h("span", {}, "Algorithm"), parts.algorithm),
+      h("label", { class: "line" }, h("span", {}, "Time limit, s"), parts.limit),
       h("p", { class: "actions" }, parts.start, " ", parts.stop),
       parts.status));
   root.append(h("h2", {}, "In the field"), parts.empty, parts.body);
@@ -315,7 +315,7 @@ function drawOutcome() {
       h("div", { class: "two" },
         h("table", {},
           h("thead", {}, h("tr", {}, ["UAV", "Before", "Now", ""].map((title) => h("th", { scope: "col" }, title)))),
-          h("tbody", {}, difference.routes.filter((route) => route.before.length || route.after.length).map((route) =>
+          h("tbody", {}, difference.routes.filter((route) => route.kind === "lost" || route.before.length || route.after.length).map((route) =>
             h("tr", { "data-uav": route.uav_id, class: route.kind },
               h("th", { scope: "row" }, route.uav_id), h("td", {}, list(route.before)),
               h("td", {}, route.kind === "lost" ? "–" : list(route.after)), h("td", {}, h("span", { class: "chip" }, route.kind)))))),

@@ -3,3 +3,7 @@
 import "./problem.js";
 import "./allocate.js";
 import "./answer.js";
+import "./compare.js";
+import "./field.js";
+import "./library.js";
+import "./take_away.js";

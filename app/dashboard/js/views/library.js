@@ -41,7 +41,7 @@ function mount(root) {
       h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void register(); } },
         h("h3", {}, "Register the policy of this allocation"),
         parts.registerHint,
-        h("label", { class: "row" }, h("span", {}, "Name"), parts.registerName),
+        h("label", { class: "line" }, h("span", {}, "Name"), parts.registerName),
         h("p", { class: "actions" }, parts.register)),
       h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void train(); } },
         h("h3", {}, "Train on the problem on screen"),

@@ -35,15 +35,15 @@ function mount(root) {
     rows: new Map(),
     form: h("form", { class: "take", onsubmit: (event) => event.preventDefault() }),
     state: h("p", { class: "muted", role: "status", "data-testid": "take-status" }),
-    flight: h("p", { class: "actions" }, FILES.map(([format, text]) =>
+    flight: h("div", { class: "files" }, FILES.map(([format, text]) =>
       h("button", { type: "button", class: "primary", dataset: { format }, onclick: () => void take(format) }, text))),
-    documents: h("p", { class: "actions" },
+    documents: h("div", { class: "files" },
       DOCUMENTS.map(([format, text]) =>
         h("button", { type: "button", dataset: { format }, onclick: () => void take(format) }, text)),
       h("a", { class: "button", target: "_blank", rel: "noopener", "data-testid": "print" }, "Open the page to print")),
   };
   const row = (text, control, only = null) => {
-    const made = h("label", { class: "row" }, h("span", {}, text), control, h("span", { class: "error", role: "alert" }));
+    const made = h("label", { class: "line" }, h("span", {}, text), control, h("span", { class: "error", role: "alert" }));
     parts.rows.set(control.name, { made, control, only });
     return made;
   };
