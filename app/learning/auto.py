@@ -69,7 +69,7 @@ class Auto:
         left = seconds_left(stop)
         policy = policy_pays(arrays, left) if given.policy is None else given.policy
         source = None
-        if policy and not new_episodes(arrays, 1).done[0] and not stop():
+        if policy and self._context.library_url and not new_episodes(arrays, 1).done[0] and not stop():
             reward = float(search.best[0])
             report(Progress(0.0, 0, reward, Plan.of(actions_of(search), problem.n_targets)))
             limit = stop if left is None else _Sooner(stop, _POLICY_SHARE * left)

@@ -126,7 +126,7 @@ def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
         scale = max(float(search.arrays.level.max()), 1e-9)
-        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale)
+        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0)
         assert_evaluated(search)
         drop_useless(search)
         assert search.routes.total[USELESS] == 0
@@ -290,7 +290,7 @@ def test_a_search_is_cold_when_its_time_is_up(monkeypatch):
     clock, temperatures = Clock(0.001), []
     monkeypatch.setattr("app.solvers.local_search.improvement.time.monotonic", clock)
 
-    def note(_search, _rng, _moves, hot, cold, _penalty):
+    def note(_search, _rng, _moves, hot, cold, *_prices):
         temperatures.append((hot, cold))
 
     monkeypatch.setattr("app.solvers.local_search.improvement.anneal", note)

@@ -9,7 +9,16 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_free
-from app.solvers.local_search.change import Change, apply, extra_distance, feasible, new_change, propose, undo
+from app.solvers.local_search.change import (
+    Change,
+    apply,
+    extra_distance,
+    extra_time,
+    feasible,
+    new_change,
+    propose,
+    undo,
+)
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
 from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
 
@@ -139,8 +148,9 @@ def drop_useless(search: Search) -> None:
 
 @compiled_free
 def anneal(
-    search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float
-) -> int:
+    search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float,
+    haste: float = 0.0, thrift: float = 0.0,
+) -> int:  # fmt: skip
     """Try moves while the temperature falls geometrically from `hot` to `cold`; return how many were kept.
 
     Parameters
@@ -155,6 +165,9 @@ def anneal(
         Temperatures, in reward.
     penalty
         What a visit that unloads nothing costs during the search, in reward; more than 0, so that it goes.
+    haste, thrift
+        What a unit of time, and of distance beyond its weight, costs during the search, in reward: room in
+        the routes is worth something before anything is put into it.
     """
     arrays, routes, change = search.arrays, search.routes, search.change
     weight = arrays.weight[0]
@@ -171,6 +184,8 @@ def anneal(
             routes.total[SATISFACTION]
             - change.total[SATISFACTION]
             - weight * extra
+            - thrift * extra
+            - haste * extra_time(routes, change)
             - penalty * (routes.total[USELESS] - change.total[USELESS])
         )
         if gain >= 0.0 or rng.random() < math.exp(gain / temperature):

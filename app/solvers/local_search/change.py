@@ -137,6 +137,17 @@ def extra_distance(arrays: ProblemArrays, routes: Routes, change: Change) -> flo
 
 
 @compiled
+def extra_time(routes: Routes, change: Change) -> float:
+    """Time of the routes of an applied change over that of those before."""
+    extra = 0.0
+    for side in range(2):
+        i = change.uav[side]
+        if i != NONE:
+            extra += routes.clock[i, routes.length[i]] - change.clock[side, change.length[side]]
+    return extra
+
+
+@compiled
 def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float) -> None:
     """Make the proposal the current plan; `extra` is its :func:`extra_distance`.
 

@@ -27,6 +27,13 @@ _TOLD = 32
 """Times that progress is told, beside the ends of the rounds."""
 
 
+_FREE = 0.002
+"""Cost of a leg between neighbours, in largest levels, below which distance is as good as free."""
+
+_FREE_HOT, _FREE_COLD = 0.3, 0.03
+"""Temperatures there: rewards of plans lie further apart, and there is nothing fine to be settled."""
+
+
 class Cooling(NamedTuple):
     """Temperatures of a round and the price of a useless visit, in largest levels.
 
@@ -36,11 +43,15 @@ class Cooling(NamedTuple):
         The temperature falls geometrically from one to the other.
     penalty
         What a visit that unloads nothing costs during the search.
+    guide
+        What a leg between neighbours costs at least during the search; its time where there are deadlines,
+        otherwise its distance.
     """
 
     hot: float = 0.05
     cold: float = 0.002
     penalty: float = 0.03
+    guide: float = 0.01
 
 
 class _Span(NamedTuple):
@@ -145,6 +156,10 @@ def _round(
 ) -> None:
     """One round of one search; the plan at its end is made legal."""
     scale = _level_scale(search.arrays)
+    leg = _neighbour_leg(search)
+    if float(search.arrays.weight[0]) * leg < _FREE * scale:
+        cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
+    haste, thrift = _guides(search, cooling.guide * scale, leg)
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
     ratio = cooling.cold / cooling.hot
     done, share, told = 0, span.share(0), 0.0
@@ -152,7 +167,7 @@ def _round(
     while done < span.moves and share < 1.0 and not stop():
         count = min(piece, span.moves - done)
         hot, cold = (cooling.hot * ratio**part for part in (share, min(share + step, 1.0)))
-        anneal(search, rng, count, hot * scale, cold * scale, cooling.penalty * scale)
+        anneal(search, rng, count, hot * scale, cold * scale, cooling.penalty * scale, haste, thrift)
         done += count
         now = span.share(done)
         # The next piece is expected to bring it as far as this one did.
@@ -176,6 +191,25 @@ def _share_best(searches: Sequence[Search]) -> None:
 
 def _silent(_share: float) -> None:
     """Only the first search tells how far it is."""
+
+
+def _neighbour_leg(search: Search) -> float:
+    """Return the mean distance between targets that are neighbours; 0 where there are none apart."""
+    near = search.near
+    legs = search.arrays.between[0][near.wanted[:, None], near.near_target[near.wanted, :3]]
+    legs = legs[np.isfinite(legs) & (legs > 0)]
+    return float(legs.mean()) if legs.size else 0.0
+
+
+def _guides(search: Search, cost: float, leg: float) -> tuple[float, float]:
+    """Return what a unit of time and of distance costs, where a leg between neighbours is to cost so much."""
+    arrays, near = search.arrays, search.near
+    if leg == 0.0:
+        return 0.0, 0.0
+    rate = cost / leg
+    if np.isfinite(arrays.deadline[0][near.wanted]).any():
+        return rate * float(arrays.speed[0][near.active].mean()), 0.0
+    return 0.0, max(0.0, rate - float(arrays.weight[0]))
 
 
 def _level_scale(arrays: ProblemArrays) -> float:

@@ -87,16 +87,20 @@ def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.rando
         return _remove(routes, change, rng, i)
     if kind < 0.45:
         return _replace(routes, near, change, rng, i)
-    if kind < 0.52:
+    if kind < 0.49:
         return _reverse(routes, change, rng, i)
+    if kind < 0.54:
+        return _shift(routes, change, rng, i)
+    if kind < 0.60:
+        return _eject(routes, near, change, rng, i)
     other = _near_visit(routes, near, rng, i)
     if other == NONE:
         return False
     m = routes.length.shape[0]
     i2, s2 = other % m, other // m
-    if kind < 0.70:
+    if kind < 0.74:
         return _relocate(routes, change, rng, i, i2, s2)
-    if kind < 0.85:
+    if kind < 0.87:
         return _swap(routes, change, rng, i, i2, s2)
     return _swap_tails(routes, change, rng, i, i2, s2)
 
@@ -175,6 +179,55 @@ def _reverse(routes: Routes, change: Change, rng: np.random.Generator, i: int) -
     for q in range(a, length):
         change.target[0, q] = routes.target[i, a + b - q if q <= b else q]
     propose(routes, change, 0, i, a, length)
+    return True
+
+
+@compiled
+def _shift(routes: Routes, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """A visit moves to another place in its route."""
+    length = routes.length[i]
+    if length < 3:
+        return False
+    a, b = draw(rng, length), draw(rng, length)
+    if abs(a - b) < 2:
+        return False
+    for q in range(min(a, b), length):
+        change.target[0, q] = routes.target[i, q]
+    if a < b:
+        for q in range(a, b):
+            change.target[0, q] = routes.target[i, q + 1]
+    else:
+        for q in range(b + 1, a + 1):
+            change.target[0, q] = routes.target[i, q - 1]
+    change.target[0, b] = routes.target[i, a]
+    propose(routes, change, 0, i, min(a, b), length)
+    return True
+
+
+@compiled
+def _eject(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """One more visit at one place of the route for one less at another: where range or time are used up."""
+    length = routes.length[i]
+    if length < 2:
+        return False
+    out, s = draw(rng, length), draw(rng, length)
+    if s == out:
+        return False
+    # The new visit follows the one that is now number s, or number s - 1, of those that stay.
+    begin = min(out, s)
+    put = _target_after(routes, near, rng, i, s if s < out else s + 1)
+    to = begin
+    for q in range(begin, length):
+        if s < out and q == s:
+            change.target[0, to] = put
+            to += 1
+        if q != out:
+            change.target[0, to] = routes.target[i, q]
+            to += 1
+        if s > out and q == s:
+            change.target[0, to] = put
+            to += 1
+    propose(routes, change, 0, i, begin, length)
     return True
 
 

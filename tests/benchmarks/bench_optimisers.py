@@ -1,0 +1,79 @@
+"""General optimisers against `auto`: generated problems of every family, the same time, plans replayed.
+
+Run: ``python tests/benchmarks/bench_optimisers.py [--seconds 1] [--sizes 5x10 10x20 20x30] [--problems 2]``.
+PyVRP and OR-Tools are an extra: ``pip install -e ".[compare]"``. What they cannot express is listed in
+``general_optimisers.py``. One core each. Every plan is replayed by the tests' referee, an illegal one counts
+as 0 and is counted; figures are the mean ratio to the best of the three on each problem.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import defaultdict
+from pathlib import Path
+from statistics import fmean
+
+sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "support")]
+
+import numpy as np  # noqa: E402
+from general_optimisers import pyvrp_plan, require, routing_plan  # noqa: E402
+from referee import Illegal, replay  # noqa: E402
+
+from app.domain.plan import Plan  # noqa: E402
+from app.domain.problem import Problem  # noqa: E402
+from app.domain.records import problem_to_record  # noqa: E402
+from app.simulation.generator import FAMILIES, generate  # noqa: E402
+from app.solvers.protocol import SolverContext  # noqa: E402
+from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
+from app.solvers.stop import Deadline  # noqa: E402
+
+
+def auto_plan(problem: Problem, seconds: float, seed: int) -> Plan:
+    """Let `auto` solve it, without a library."""
+    solver = create_solver("auto", parse_parameters("auto", {}), SolverContext())
+    return solver.solve(problem, seed, Deadline(seconds), lambda _progress: None).plan
+
+
+OPTIMISERS = {"auto": auto_plan, "PyVRP": pyvrp_plan, "OR-Tools": routing_plan}
+
+
+def main() -> None:
+    """Print a row a family."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--seconds", type=float, default=1.0)
+    options.add_argument("--sizes", nargs="+", default=["5x10", "10x20", "20x30"])
+    options.add_argument("--problems", type=int, default=2)
+    given = options.parse_args()
+    require("pyvrp")
+    require("ortools")
+    auto_plan(generate("uniform", 3, 4, 3, np.random.default_rng(0)), 0.1, 0)
+    print(f"{given.seconds} s each; sizes {' '.join(given.sizes)}; {given.problems} problems each")
+    print(f"{'family':<14}" + "".join(f"{name:>10}" for name in OPTIMISERS) + f"{'illegal':>10}")
+    every: dict[str, list[float]] = defaultdict(list)
+    for family in FAMILIES:
+        ratios: dict[str, list[float]] = defaultdict(list)
+        illegal = 0
+        for size in given.sizes:
+            m, n = map(int, size.split("x"))
+            for number in range(given.problems):
+                problem = generate(family, m, n, 3, np.random.default_rng([17, m, n, number]))
+                record, rewards = problem_to_record(problem), {}
+                for name, optimise in OPTIMISERS.items():
+                    try:
+                        plan = optimise(problem, given.seconds, number)
+                        rewards[name] = float(replay(record, plan.assignment)["reward"])
+                    except Illegal:
+                        rewards[name], illegal = 0.0, illegal + 1
+                best = max(rewards.values())
+                for name, reward in rewards.items():
+                    ratios[name].append(reward / best if best > 0 else 1.0)
+        for name in OPTIMISERS:
+            every[name] += ratios[name]
+        row = "".join(f"{fmean(ratios[name]):>10.3f}" for name in OPTIMISERS)
+        print(f"{family:<14}{row}{illegal:>10}", flush=True)
+    print(f"{'all':<14}" + "".join(f"{fmean(every[name]):>10.3f}" for name in OPTIMISERS))
+
+
+if __name__ == "__main__":
+    main()
