@@ -2,6 +2,9 @@
 
 import { h } from "./dom.js";
 
+/** A limit above this says nothing to anybody. */
+const NO_LIMIT = 1e9;
+
 /**
  * Fields of an object's schema.
  * @param {Record<string, object>} properties JSON schemas by name
@@ -58,8 +61,14 @@ function makeField(name, schema, pointer, value, onchange) {
   const input = inputFor(schema, given);
   input.name = name;
   input.addEventListener("change", onchange);
-  const element = labelled(name.replaceAll("_", " "), input, { pointer, hint: [schema.description, range(schema)].filter(Boolean).join(". ") });
+  const element = labelled(titleOf(name), input, { pointer, hint: [schema.description, range(schema)].filter(Boolean).join(". ") });
   return { name, element, read: () => valueOf(schema, input) };
+}
+
+/** A parameter's name for people: `time_limit_s` is “Time limit, s”. */
+function titleOf(name) {
+  const text = name.replace(/_s$/, ", s").replaceAll("_", " ");
+  return text[0].toUpperCase() + text.slice(1);
 }
 
 function inputFor(schema, given) {
@@ -88,7 +97,8 @@ function valueOf(schema, input) {
 function range({ minimum, maximum, exclusiveMinimum, type }) {
   if (type !== "number" && type !== "integer") return "";
   const low = minimum ?? exclusiveMinimum;
-  if (low === undefined && maximum === undefined) return "";
-  if (maximum === undefined) return exclusiveMinimum === undefined ? `At least ${low}` : `More than ${low}`;
+  const endless = maximum === undefined || maximum > NO_LIMIT;
+  if (low === undefined && endless) return "";
+  if (endless) return exclusiveMinimum === undefined ? `At least ${low}` : `More than ${low}`;
   return `${exclusiveMinimum === undefined ? "" : "More than "}${low} to ${maximum}`;
 }

@@ -30,7 +30,7 @@ export class Grid {
     const sameColumns = columns.map((c) => c.name).join() === this.columns.map((c) => c.name).join();
     if (!sameColumns) {
       this.rows.clear();
-      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", title: column.hint }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "hint" }, "")));
+      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "hint" }, "")));
     }
     this.columns = columns;
     this.items = items;
@@ -81,7 +81,7 @@ export class Grid {
   #row(item) {
     const cells = this.columns.map((column) => {
       const value = column.read(item);
-      return h("td", { role: "gridcell", tabindex: "-1", class: typeof value === "number" ? "num" : null, dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
+      return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" ? null : "num", dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
     });
     const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": `Delete ${item.id}`, title: `Delete ${item.id}` }, "×");
     return h("tr", { role: "row", dataset: { id: item.id } }, cells, h("td", { role: "gridcell", tabindex: "-1" }, remove));

@@ -20,9 +20,11 @@ export class DispatchMap {
     this.element = element;
     this.map = null;
     this.given = null;
+    this.handled = false;
+    this.fitting = false;
     this.placing = null;
     this.symbols = new Map();
-    subscribe(["problem"], ({ problem }, _) => this.#onProblem(problem));
+    subscribe(["problem"], ({ problem }) => this.#onProblem(problem));
     subscribe(["answer", "incumbent", "answerProblem"], () => this.#draw());
     subscribe(["selection"], () => this.#markSelection());
     element.addEventListener("keydown", (event) => this.#onKey(event));
@@ -49,16 +51,27 @@ export class DispatchMap {
 
   /** Bring everything into sight. */
   fit() {
-    const box = extent(this.#shown().problem);
-    if (!box) return this.map.setView([0, 0], 2);
+    this.handled = false;
+    this.fitting = true;
+    this.#fitBox(extent(this.#shown().problem));
+    this.fitting = false;
+  }
+
+  #fitBox(box) {
+    if (!box) return this.map.setView([0, 0], 2, { animate: false });
     const bounds = L.latLngBounds([box.minY, box.minX], [box.maxY, box.maxX]);
     const lone = box.minX === box.maxX && box.minY === box.maxY;
     this.map.fitBounds(lone ? bounds.pad(1) : bounds, { padding: [46, 46], animate: false, maxZoom: lone ? 10 : undefined });
   }
 
-  /** The element has another size. */
+  /** The element has another size; a view that nobody chose by hand goes on showing everything. */
   resized() {
-    this.map?.invalidateSize({ animate: false });
+    // A map that is hidden has no size, and would lose its place.
+    if (!this.map || !this.element.clientWidth) return;
+    this.fitting = true;
+    this.map.invalidateSize({ animate: false });
+    this.fitting = false;
+    if (!this.handled) this.fit();
   }
 
   #shown() {
@@ -90,6 +103,7 @@ export class DispatchMap {
     this.renderer = L.svg({ padding: 0.5, pane: "routes" });
     this.routes = L.layerGroup().addTo(this.map);
     this.markers = L.layerGroup().addTo(this.map);
+    this.map.on("movestart zoomstart", () => { this.handled ||= !this.fitting; });
     this.map.on("click", ({ latlng }) => this.#onClick(latlng));
   }
 
@@ -155,7 +169,7 @@ export class DispatchMap {
   }
 
   #drawUavs(problem) {
-    const size = problem.uavs.length > 40 ? 13 : 19;
+    const size = problem.uavs.length > 40 ? 12 : 17;
     const crowds = new Map();
     problem.uavs.forEach((uav, index) => {
       const at = position(uav);

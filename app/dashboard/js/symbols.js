@@ -39,6 +39,6 @@ export function uavSymbol(uav, index, size) {
 export function aside(n, size) {
   if (n === 0) return [0, 0];
   const angle = (n * 137.508 * Math.PI) / 180;
-  const far = size * 0.85 * Math.sqrt(n + 0.6);
+  const far = size * 0.78 * Math.sqrt(n + 0.6);
   return [far * Math.cos(angle), far * Math.sin(angle)];
 }

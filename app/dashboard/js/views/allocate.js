@@ -36,7 +36,7 @@ function makeForm(schemas) {
   const elsewhere = h("ul", { class: "violations", id: "violations" });
   const start = h("button", { class: "primary", title: "Ctrl+Enter", id: "start" }, "Allocate");
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
-  const form = h("form", { id: "allocate-form", class: "stack", novalidate: true },
+  const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
     labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element,
     h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place),
     h("div", { class: "row" }, start, stop), elsewhere);

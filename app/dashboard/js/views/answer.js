@@ -35,7 +35,7 @@ function routeRows(problem, answer) {
     route.stops.map((stop, n) => {
       const key = h("span", { class: "key", "aria-hidden": "true" });
       key.style.setProperty("--hue", hue(indices.get(route.uav_id)));
-      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance), " + ", number(route.return_distance), " home")) : null;
+      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
       return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
         h("td", { class: "num" }, String(n + 1)), h("td", {}, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
         h("td", { class: "num" }, stop.delivered.flatMap((amount, k) => [k ? ", " : null, number(amount)])));

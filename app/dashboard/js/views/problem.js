@@ -175,11 +175,11 @@ registerView({
   mount(root, { map, dock }) {
     const examples = h("div", { class: "row" });
     const inspector = h("div", {});
-    const settings = h("div", { class: "stack" });
+    const settings = h("div", { class: "block" });
     root.append(
-      h("div", { class: "stack" }, h("h2", {}, "Examples"), examples),
-      h("div", { class: "stack" }, h("h2", {}, "Import and export"), filesCard()),
-      h("div", { class: "stack" }, h("h2", {}, "Edit"), placing(map), inspector),
+      h("div", { class: "block" }, h("h2", {}, "Examples"), examples),
+      h("div", { class: "block" }, h("h2", {}, "Import and export"), filesCard()),
+      h("div", { class: "block" }, h("h2", {}, "Edit"), placing(map), inspector),
       h("details", {}, h("summary", {}, "Settings of the problem"), settings),
     );
     mountTables(dock);
