@@ -9,6 +9,8 @@ from app.learning.architecture import NetworkSizes
 from app.learning.environment import Environment
 from app.learning.exploration import EpsilonSchedule
 from app.learning.networks import ValueNetwork
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
 
 
 class EpisodeRecord:
@@ -66,17 +68,24 @@ class Actor:
         self._actions = torch.from_numpy(self._record.actions)
         self._no_draws = np.ones((environment.max_steps, environment.sizes.n_agents, 2))
 
-    def play_greedily(self) -> EpisodeRecord:
+    def play_greedily(self, stop: StopCriterion = never) -> EpisodeRecord | None:
         """Play an episode without exploration and without drawing a random number.
+
+        Parameters
+        ----------
+        stop
+            Asked before every step but the first.
 
         Returns
         -------
         EpisodeRecord
-            Overwritten by this actor's next episode.
+            Overwritten by this actor's next episode; None if it was stopped.
         """
-        return self._play(self._no_draws, EpsilonSchedule(0.0, 0.0, 1), 0)
+        return self._play(self._no_draws, EpsilonSchedule(0.0, 0.0, 1), 0, stop)
 
-    def play(self, schedule: EpsilonSchedule, steps: int, rng: np.random.Generator) -> EpisodeRecord:
+    def play(
+        self, schedule: EpsilonSchedule, steps: int, rng: np.random.Generator, stop: StopCriterion = never
+    ) -> EpisodeRecord | None:
         """Play an episode with exploration.
 
         Parameters
@@ -87,22 +96,30 @@ class Actor:
             Environment steps taken in all episodes before.
         rng
             Drawn from equally often by every episode.
+        stop
+            Asked before every step but the first.
 
         Returns
         -------
         EpisodeRecord
-            Overwritten by this actor's next episode.
+            Overwritten by this actor's next episode; None if it was stopped.
         """
-        return self._play(rng.random(self._no_draws.shape), schedule, steps)
+        return self._play(rng.random(self._no_draws.shape), schedule, steps, stop)
 
     @torch.inference_mode()
     def _play(
-        self, draws: np.ndarray[tuple[int, ...], np.dtype[np.float64]], schedule: EpsilonSchedule, steps: int
-    ) -> EpisodeRecord:
+        self,
+        draws: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+        schedule: EpsilonSchedule,
+        steps: int,
+        stop: StopCriterion,
+    ) -> EpisodeRecord | None:
         record, environment = self._record, self.environment
         environment.reset()
         hidden, last_actions, t = None, None, 0
         while not environment.done:
+            if t and stop():
+                return None
             environment.observe(record.states[t], record.allowed[t])
             values, hidden = self._network.step(self._states[t : t + 1], last_actions, hidden)
             record.rewards[t] = environment.step(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterator
 from typing import cast
 
 import torch
@@ -10,6 +11,14 @@ from torch import Tensor, nn
 
 from app.learning.networks import ValueNetwork
 from app.learning.replay_buffer import Batch
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
+
+_WORK_A_PART = 1_000_000
+"""Numbers that one part of an update goes through, in and out of the network, about."""
+
+_WORK_AN_AGENT = 400
+"""Of them the hidden ones of an agent in a step."""
 
 
 class Learner:
@@ -63,27 +72,61 @@ class Learner:
             targets[:-1] += self._gamma * torch.where(goes_on, total, 0.0)
         return targets
 
-    def loss(self, batch: Batch) -> Tensor:
-        """Eq. 4 with the square it lacks in print: mean squared TD error of the steps that were played."""
+    def loss(self, batch: Batch, played: Tensor | None = None) -> Tensor:
+        """Eq. 4 with the square it lacks in print: mean squared TD error of the steps that were played.
+
+        Parameters
+        ----------
+        batch
+            The episodes.
+        played
+            How many steps of the whole batch were played, where these are only some of its episodes.
+        """
         network = cast(ValueNetwork, self.network)
         values = network.unroll(batch.states, batch.actions)  # (T, B, M, A)
         taken = values.gather(-1, batch.actions.unsqueeze(-1)).squeeze(-1)  # (T, B, M)
         total = network.mix(taken, batch.states)  # (T, B)
         error = (total - self.targets(batch)) * batch.filled
-        return error.square().sum() / batch.filled.sum()
+        return error.square().sum() / (batch.filled.sum() if played is None else played)
 
-    def update(self, batch: Batch) -> None:
+    def update(self, batch: Batch, stop: StopCriterion = never) -> bool:
         """Take one step down the loss.
 
         A gradient that is not finite, which only rewards beyond the range of float32 make, changes nothing.
+
+        Parameters
+        ----------
+        batch
+            Large ones are worked off some episodes at a time, whose gradients add up to the batch's.
+        stop
+            Asked between them.
+
+        Returns
+        -------
+        bool
+            False if it was stopped: then nothing has changed.
         """
         self._optimiser.zero_grad()
-        self.loss(batch).backward()  # type: ignore[no-untyped-call]
+        played = batch.filled.sum()
+        for number, part in enumerate(_parts(batch)):
+            if number and stop():
+                return False
+            self.loss(part, played).backward()  # type: ignore[no-untyped-call]
         norm = nn.utils.clip_grad_norm_(self._parameters, self._grad_norm_clip, foreach=True)
         if torch.isfinite(norm):
             self._optimiser.step()
         self.updates += 1
+        return True
 
     def update_target(self) -> None:
         """Copy the network's parameters to the target network."""
         self.target.load_state_dict(self.network.state_dict())
+
+
+def _parts(batch: Batch) -> Iterator[Batch]:
+    """Cut a batch into episodes that take some hundredths of a second; most batches are one part."""
+    steps, episodes, agents, actions = batch.allowed.shape
+    each = steps * (agents * (actions + _WORK_AN_AGENT) + batch.states.shape[2])
+    size = max(1, _WORK_A_PART // each)
+    for first in range(0, episodes, size):
+        yield Batch(*(tensor[:, first : first + size] for tensor in batch))

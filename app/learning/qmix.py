@@ -6,6 +6,7 @@ from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
 from app.learning.architecture import NetworkSizes, QmixConfig
 from app.learning.checkpoint import encode
+from app.learning.checkpoint_time import TimeForCheckpoint
 from app.learning.environment import SwarmEnvironment
 from app.learning.episode import Actor
 from app.learning.learner import Learner
@@ -144,14 +145,19 @@ class Qmix:
             network = QmixNetwork(
                 config.sizes, parameters.drqn_hidden_dim, parameters.qmix_hidden_dim, streams.initialisation
             )
-            training = train(problem, network, parameters, streams, stop, report)
-            checkpoint = encode(
-                network,
-                config=config,
-                task=problem,
-                algorithm="qmix",
-                seed=seed,
-                parameters=parameters,
-                metrics=metrics_of(training),
+            in_time = TimeForCheckpoint(stop, network)
+            training = train(problem, network, parameters, streams, in_time, report)
+            checkpoint = (
+                encode(
+                    network,
+                    config=config,
+                    task=problem,
+                    algorithm="qmix",
+                    seed=seed,
+                    parameters=parameters,
+                    metrics=metrics_of(training),
+                )
+                if in_time.checkpoint
+                else None
             )
         return Solution(training.incumbent.plan, training.history, parameters, checkpoint=checkpoint)

@@ -14,6 +14,7 @@ from app.learning.random_streams import RandomStreams
 from app.learning.replay_buffer import ReplayBuffer
 from app.simulation.explain import reward_of
 from app.solvers.protocol import History, Progress, Report, StopCriterion
+from app.solvers.stop import never
 
 
 @dataclass
@@ -105,38 +106,52 @@ class Trainer:
         incumbent
             A plan to begin with; replaced in the result by any better one.
         stop
-            Asked before every epoch.
+            Asked before every epoch, every step of an episode and every part of a large update. An epoch that
+            it ends early is not counted; a plan that was completed in it is.
         report
             Told after every epoch.
         """
         parameters = self._parameters
         training = Training(incumbent)
-        if self._evaluate(training).length == 0:
+        first = self._evaluate(training, never)
+        if first is None or first.length == 0:
             return training  # Nothing can be flown, so there is nothing to learn.
         while training.epochs < parameters.n_epochs and not stop():
+            if not self._play_and_learn(training, training.epochs + 1, stop):
+                break
             training.epochs += 1
-            self._play_and_learn(training)
             if training.epochs % parameters.evaluate_per_epoch == 0 or training.epochs == parameters.n_epochs:
-                self._evaluate(training)
+                self._evaluate(training, stop)
             best = training.incumbent
             report(Progress(training.epochs / parameters.n_epochs, training.epochs, best.reward, best.plan))
         return training
 
-    def _play_and_learn(self, training: Training) -> None:
-        record = self._explorer.play(self._schedule, training.steps, self._streams.exploration)
+    def _play_and_learn(self, training: Training, epoch: int, stop: StopCriterion) -> bool:
+        """Do an epoch; False if it was stopped."""
+        record = self._explorer.play(self._schedule, training.steps, self._streams.exploration, stop)
+        if record is None:
+            return False
         training.steps += record.length
         self._consider(record, training)
         self._buffer.add(record)
         learner, period = self._learner, self._parameters.update_target_params
-        copy_target = training.epochs % period == 0
+        copy_target = epoch % period == 0
         if len(self._buffer) >= self._parameters.first_update:
-            learner.update(self._buffer.sample(self._parameters.batch_size, self._streams.replay))
+            if stop():
+                return False
+            batch = self._buffer.sample(self._parameters.batch_size, self._streams.replay)
+            if not learner.update(batch, stop):
+                return False
             copy_target |= self._count_updates and learner.updates % period == 0
         if copy_target:
             learner.update_target()
+        return True
 
-    def _evaluate(self, training: Training) -> EpisodeRecord:
-        record = self._evaluator.play_greedily()
+    def _evaluate(self, training: Training, stop: StopCriterion) -> EpisodeRecord | None:
+        """Play greedily and note what that earns; None if it was stopped, and nothing is noted."""
+        record = self._evaluator.play_greedily(stop)
+        if record is None:
+            return None
         self._consider(record, training)
         training.history.add(training.epochs, record.reward if record.length else training.incumbent.reward)
         return record

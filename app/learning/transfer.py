@@ -13,6 +13,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoint import encode
+from app.learning.checkpoint_time import TimeForCheckpoint
 from app.learning.networks import QmixNetwork
 from app.learning.parameters import TransferQmixParameters
 from app.learning.qmix import metrics_of, qmix_config, require_memory, train
@@ -93,16 +94,21 @@ def _fine_tune(
     config = qmix_config(problem, used)
     require_memory(used, config.sizes, problem.max_steps, used.drqn_hidden_dim)
     network = copy.deepcopy(cast(QmixNetwork, source.network))
-    training = train(problem, network, used, random_streams(seed), stop, report, count_updates=True)
+    in_time = TimeForCheckpoint(stop, network)
+    training = train(problem, network, used, random_streams(seed), in_time, report, count_updates=True)
     parameters = parameters.model_copy(update={"n_epochs": used.n_epochs})
-    learned = encode(
-        network,
-        config=config,
-        task=problem,
-        algorithm="transfer_qmix",
-        seed=seed,
-        parameters=parameters,
-        metrics=metrics_of(training),
+    learned = (
+        encode(
+            network,
+            config=config,
+            task=problem,
+            algorithm="transfer_qmix",
+            seed=seed,
+            parameters=parameters,
+            metrics=metrics_of(training),
+        )
+        if in_time.checkpoint
+        else None
     )
     return Solution(training.incumbent.plan, training.history, parameters, source.policy, learned)
 

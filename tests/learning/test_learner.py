@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from app.learning import learner as learner_module
 from app.learning.learner import Learner
 from app.learning.replay_buffer import Batch
 
@@ -170,3 +171,23 @@ def test_sampling_is_all_that_updates_draw(learner, buffer):
     state = torch.get_rng_state()
     learner.update(buffer.sample(8, np.random.default_rng(0)))
     assert torch.equal(torch.get_rng_state(), state)
+
+
+def test_a_batch_in_parts_has_the_gradient_of_the_whole(network, batch, monkeypatch):
+    gradients = []
+    for work in (10**9, 1):
+        monkeypatch.setattr(learner_module, "_WORK_A_PART", work)
+        learner = Learner(copy.deepcopy(network), 1e-3, GAMMA, 1e9)
+        assert learner.update(batch)
+        gradients.append([each.grad for each in learner.network.parameters()])
+    for whole, parts in zip(*gradients, strict=True):
+        torch.testing.assert_close(parts, whole, rtol=1e-3, atol=1e-6)
+
+
+def test_an_update_that_is_stopped_between_parts_changes_nothing(learner, batch, monkeypatch):
+    monkeypatch.setattr(learner_module, "_WORK_A_PART", 1)
+    before = [parameter.detach().clone() for parameter in learner.network.parameters()]
+    assert not learner.update(batch, lambda: True)
+    assert learner.updates == 0
+    for parameter, old in zip(learner.network.parameters(), before, strict=True):
+        assert torch.equal(parameter, old)

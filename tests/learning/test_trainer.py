@@ -4,6 +4,7 @@ import torch
 
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
+from app.learning.checkpoint_time import TimeForCheckpoint
 from app.learning.environment import SwarmEnvironment
 from app.learning.episode import Actor
 from app.learning.learner import Learner
@@ -25,9 +26,9 @@ class Recorder:
     def updates(self):
         return self._learner.updates
 
-    def update(self, batch):
+    def update(self, batch, stop):
         self._calls.append(("update", batch.rewards.shape[1]))
-        self._learner.update(batch)
+        return self._learner.update(batch, stop)
 
     def update_target(self):
         self._calls.append(("target", self.updates))
@@ -225,3 +226,39 @@ def test_streams_of_a_seed_are_independent_and_repeatable():
     state = np.random.get_state()[1].copy()
     random_streams(9)
     assert np.array_equal(np.random.get_state()[1], state)
+
+
+def test_stop_is_asked_within_an_epoch(problem, network):
+    """The third question comes in the midst of the first episode: before its third step."""
+    asked = []
+
+    def stop():
+        asked.append(len(asked))
+        return len(asked) == 3
+
+    training, _ = train(problem, network, QmixParameters(), stop=stop)
+    assert len(asked) == 3
+    assert (training.epochs, training.steps) == (0, 0)
+    assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)
+
+
+class OneQuestion:
+    """A criterion with so many seconds left."""
+
+    def __init__(self, left):
+        self.left = left
+
+    def __call__(self):
+        return self.left is not None and self.left <= 0
+
+    def seconds_left(self):
+        return self.left
+
+
+def test_time_is_left_for_the_checkpoint_where_it_is_worth_it(network):
+    needed = 1.2e-8 * sum(4 * parameter.numel() for parameter in network.parameters())
+    ample, short, none = (TimeForCheckpoint(OneQuestion(s), network) for s in (10.0, 2 * needed, None))
+    assert ample.seconds_left() == pytest.approx(10.0 - needed)
+    assert (ample(), ample.checkpoint) == (False, True)
+    assert (short.checkpoint, short.seconds_left()) == (False, 2 * needed)
+    assert (none.checkpoint, none.seconds_left(), none()) == (True, None, False)

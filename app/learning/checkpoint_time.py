@@ -1,0 +1,50 @@
+"""Time for what was learned: networks of large problems have megabytes, which are coded, moved and stored."""
+
+from __future__ import annotations
+
+from torch import nn
+
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import seconds_left
+
+_SECONDS_A_BYTE = 1.2e-8
+"""Coding takes a quarter of it, the way to the service another, the disk the rest; measured with 27 MB."""
+
+_LARGEST_SHARE = 0.25
+
+
+class TimeForCheckpoint:
+    """Stops before the given criterion does, by the time that a network's checkpoint takes.
+
+    Where that would be a large part of the time limit, what could be learned in the rest is not worth it: the
+    whole time goes to the plan, and no checkpoint is left behind.
+
+    Parameters
+    ----------
+    stop
+        The criterion.
+    network
+        What is trained.
+
+    Attributes
+    ----------
+    checkpoint
+        Whether there is time for one.
+    """
+
+    def __init__(self, stop: StopCriterion, network: nn.Module) -> None:
+        needed = _SECONDS_A_BYTE * sum(4 * parameter.numel() for parameter in network.parameters())
+        left = seconds_left(stop)
+        self.checkpoint = left is None or needed <= _LARGEST_SHARE * left
+        self._stop = stop
+        self._kept = needed if left is not None and self.checkpoint else 0.0
+
+    def __call__(self) -> bool:
+        """See :class:`~app.solvers.protocol.StopCriterion`."""
+        left = self.seconds_left()
+        return self._stop() or (left is not None and left <= 0.0)
+
+    def seconds_left(self) -> float | None:
+        """Return the seconds left for learning; None without a time limit."""
+        left = seconds_left(self._stop)
+        return None if left is None else left - self._kept
