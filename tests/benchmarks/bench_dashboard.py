@@ -1,8 +1,8 @@
 """How long a pan of the dashboard's map takes to redraw: 100 UAVs by 300 areas with a plan on it.
 
-Run it with ``python tests/benchmarks/bench_dashboard.py``. It starts a service and Debian's Chromium, drags the map
-forty times, and measures from each movement of the pointer until the frame with it has been drawn. The limit is
-50 ms; without a graphics card, the browser's own rasteriser is in the figures.
+Run it with ``python tests/benchmarks/bench_dashboard.py``. It starts a service and Debian's Chromium, drags
+the map forty times, and measures from each movement of the pointer until the frame with it has been drawn.
+The limit is 50 ms; without a graphics card, the browser's own rasteriser is in the figures.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support"), str(ROOT / "tests" / "dashboard")]
 
-from conftest import browsing
-from dashboard_steps import open_problem, ready, show_answer
-from live_service import LiveService
+from conftest import browsing  # noqa: E402 - tests are no package
+from dashboard_steps import open_problem, ready, show_answer  # noqa: E402 - tests are no package
+from live_service import LiveService  # noqa: E402 - tests are no package
 
 N_UAVS, N_TARGETS, SEED, MOVES, LIMIT_MS = 100, 300, 7, 40, 50.0
 _WATCH = """() => {

@@ -10,10 +10,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support"), str(Path(__file__).parent)]
 
-from conftest import browsing
-from dashboard_steps import go, ready, show_answer
-from live_service import LiveService
-from playwright.sync_api import Page, expect
+from conftest import browsing  # noqa: E402 - tests are no package
+from dashboard_steps import go, ready, show_answer  # noqa: E402 - tests are no package
+from live_service import LiveService  # noqa: E402 - tests are no package
+from playwright.sync_api import Page, expect  # noqa: E402 - tests are no package
 
 OUT = ROOT / "app" / "dashboard" / "screenshots"
 SIZE = {"width": 1280, "height": 800}

@@ -143,3 +143,21 @@ def test_keeping_the_plan_is_worth_what_its_rest_earns(page, service):
 
     assert kept["kept"]["reward"] == pytest.approx(answer["reward"])
     assert {route["kind"] for route in kept["routes"]} == {"same"}
+
+
+def test_uavs_on_their_way_home_are_called_back_only_where_that_is_chosen(page, service):
+    ready(page)
+    answer = show_answer(page, service.url, algorithm="greedy")
+    last = max(stop["arrival_time"] for route in answer["routes"] for stop in route["stops"])
+
+    kept, recalled = page.evaluate(
+        "async (time) => { const { get } = await import('/dashboard/js/state.js');"
+        " const { problemAt } = await import('/dashboard/js/mid_mission.js');"
+        " const { answerProblem: p, answer: a } = get();"
+        " return [false, true].map((recall) => problemAt(p, a, time, { recall })); }",
+        last + 0.2,
+    )
+
+    flown = [bool(route["stops"]) for route in answer["routes"]]
+    assert [uav["ret"] for uav in kept["uavs"]] == [int(flies) for flies in flown]
+    assert [uav["ret"] for uav in recalled["uavs"]] == [0] * len(flown)

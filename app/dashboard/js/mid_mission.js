@@ -120,7 +120,7 @@ export function uavAt(problem, answer, i, time) {
  * @param {object} problem what was allocated
  * @param {object} answer the plan for it
  * @param {number} time from the plan's beginning
- * @param {object} choices lost: ids of UAVs that are out; recall: UAVs on their way home may get tasks again
+ * @param {object} choices lost: ids of UAVs that are out; recall: UAVs that fly home, or are back, may get tasks again
  */
 export function problemAt(problem, answer, time, { lost = new Set(), recall = false } = {}) {
   const needs = new Map(problem.targets.map((target, j) => [targetId(target, j), target.loadlist.slice()]));
@@ -133,7 +133,7 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
       needs.set(stop.target_id, less(needs.get(stop.target_id), stop.delivered));
     }
     if (lost.has(uavId(uav, i))) return;
-    const ret = now.returning && !(recall && now.doing === "returning" && !uav.ret) ? 1 : 0;
+    const ret = now.returning && (uav.ret || !recall) ? 1 : 0;
     uavs.push({
       ...uav, id: uavId(uav, i), x_c: now.place[0], y_c: now.place[1], dis: now.flown, ret, loadlist: load,
     });

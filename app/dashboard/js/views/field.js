@@ -51,7 +51,7 @@ function mount(root, context) {
       h("p", { class: "clock" }, parts.time, parts.exact, parts.shown),
       h("p", { class: "actions" }, parts.before, " ", parts.run, " ", parts.next)),
     h("section", { class: "card" }, h("h3", {}, "UAVs"), parts.uavs,
-      h("label", { class: "line" }, h("span", {}, "UAVs on their way home may get tasks again"), parts.recall)),
+      h("label", { class: "line" }, h("span", {}, "UAVs that fly home, or are back, may get tasks again"), parts.recall)),
     h("section", { class: "card" }, h("h3", {}, "Areas"), parts.areas,
       h("p", { class: "actions" }, h("button", { type: "button", onclick: discover }, "Add an area"))),
     h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void again(); } },
@@ -177,7 +177,7 @@ function drawUavs(now) {
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
   parts.uavs.replaceChildren(
     h("table", { "data-testid": "field-uavs" },
-      h("thead", {}, h("tr", {}, ["UAV", "Doing", "Range left", "Load", "Lost"].map((title) => h("th", { scope: "col" }, title)))),
+      h("thead", {}, h("tr", {}, ["UAV", "Doing", "Range left", "Load", "Lost"].map((title, i) => h("th", { scope: "col", class: i === 2 || i === 3 ? "n" : null }, title)))),
       h("tbody", {}, problem.uavs.map((uav, i) => {
         const is = uavAt(problem, answer, i, clock);
         const doing = { flying: `to ${is.next}`, unloading: `at ${is.next}` }[is.doing] ?? is.doing;
@@ -320,7 +320,7 @@ function drawOutcome() {
               h("th", { scope: "row" }, route.uav_id), h("td", {}, list(route.before)),
               h("td", {}, route.kind === "lost" ? "–" : list(route.after)), h("td", {}, h("span", { class: "chip" }, route.kind)))))),
         h("table", {},
-          h("thead", {}, h("tr", {}, ["Area", "Met before", "Met now"].map((title) => h("th", { scope: "col" }, title)))),
+          h("thead", {}, h("tr", {}, ["Area", "Met before", "Met now"].map((title, i) => h("th", { scope: "col", class: i ? "n" : null }, title)))),
           h("tbody", {}, moved.length
             ? moved.map((area) => h("tr", { "data-area": area.target_id },
               h("th", { scope: "row" }, area.target_id), h("td", { class: "n" }, percent(area.before)), h("td", { class: "n" }, percent(area.after))))

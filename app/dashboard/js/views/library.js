@@ -112,7 +112,7 @@ function card(policy, distance, place) {
       h("span", { class: "chip" }, policy.architecture),
       place === 0 && distance !== undefined && h("span", { class: "chip good" }, "most similar")),
     h("dl", { class: "pairs" },
-      h("dt", {}, "Size"), h("dd", {}, size),
+      h("dt", {}, "UAVs × areas × materials"), h("dd", {}, `${policy.n_uavs} × ${policy.n_targets} × ${policy.n_materials}`),
       h("dt", {}, "Distance to this problem"), h("dd", { class: "similarity" }, distance === undefined ? "–" : number(distance)),
       metrics.flatMap(([name, value]) => [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, number(value))])),
     h("button", { type: "button", class: "quiet", "aria-label": `Delete ${policy.name}`, onclick: () => void drop(policy) }, "Delete"));
