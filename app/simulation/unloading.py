@@ -50,8 +50,10 @@ class Unloading(NamedTuple):
         (S*M, K) what each visit unloads; valid for the visits of the last targets that were served.
     left
         (M,) what each UAV still has of one material.
-    worth, rank
-        (N,) worth of a unit at each target, and the targets' places in falling order of it.
+    worth, order, rank
+        (N,) worth of a unit at each target, the targets in falling order of it, and their places there.
+    value
+        (N,) what is earned at each target; valid for those that were served.
     served
         (N,) targets, those to be served first.
     seen_target, seen_uav
@@ -63,13 +65,15 @@ class Unloading(NamedTuple):
     taken_from
         (M,) the slot at which it gives up what the one before it takes over, NONE for the first.
     number
-        (2,) numbers of the last search and of the last serving.
+        (3,) numbers of the last search and of the last serving, and visits looked at in all.
     """
 
     amount: Floats
     left: Floats
     worth: Floats
+    order: Integers
     rank: Integers
+    value: Floats
     served: Integers
     seen_target: Integers
     seen_uav: Integers
@@ -86,13 +90,16 @@ def new_unloading(arrays: ProblemArrays) -> Unloading:
     needed = arrays.need_total[0] > 0
     worth = np.zeros(n)
     worth[needed] = arrays.level[0][needed] / arrays.need_total[0][needed]
+    order = np.argsort(-worth, kind="stable")
     rank = np.empty(n, np.int64)
-    rank[np.argsort(-worth, kind="stable")] = np.arange(n)
+    rank[order] = np.arange(n)
     return Unloading(
         amount=np.zeros((int(arrays.max_steps[0]) * m, k)),
         left=np.zeros(m),
         worth=worth,
+        order=order,
         rank=rank,
+        value=np.zeros(n),
         served=np.zeros(n, np.int64),
         seen_target=np.zeros(n, np.int64),
         seen_uav=np.zeros(m, np.int64),
@@ -100,7 +107,7 @@ def new_unloading(arrays: ProblemArrays) -> Unloading:
         queue=np.zeros(m, np.int64),
         came_from=np.zeros(m, np.int64),
         taken_from=np.zeros(m, np.int64),
-        number=np.zeros(2, np.int64),
+        number=np.zeros(3, np.int64),
     )
 
 
@@ -134,7 +141,7 @@ def best_deliveries(arrays: ProblemArrays, actions: Integers) -> Floats:
         (S', M, K) amounts; 0 where there is no visit, and where one is of no use.
     """
     visits, unloading = visits_of(arrays, actions), new_unloading(arrays)
-    unloading.served[:] = np.argsort(unloading.rank)
+    unloading.served[:] = unloading.order
     serve(arrays, visits, unloading, len(unloading.served))
     steps, m = actions.shape
     delivered = np.zeros((steps, m, arrays.shape[2]))
@@ -178,7 +185,8 @@ def serve(arrays: ProblemArrays, visits: Visits, unloading: Unloading, count: in
         How many targets.
     """
     m = visits.length.shape[0]
-    earned = 0.0
+    for q in range(count):
+        unloading.value[unloading.served[q]] = 0.0
     for k in range(unloading.amount.shape[1]):
         unloading.number[1] += 1
         for q in range(count):
@@ -188,11 +196,14 @@ def serve(arrays: ProblemArrays, visits: Visits, unloading: Unloading, count: in
                 if arrays.ret[0, slot % m]:
                     unloading.left[slot % m] = 0.0
                 unloading.amount[slot, k] = 0.0
+                unloading.number[2] += 1
                 slot = visits.following[slot]
         for q in range(count):
             j = unloading.served[q]
-            met = _fill(arrays, visits, unloading, j, k)
-            earned += unloading.worth[j] * met
+            unloading.value[j] += unloading.worth[j] * _fill(arrays, visits, unloading, j, k)
+    earned = 0.0
+    for q in range(count):
+        earned += unloading.value[unloading.served[q]]
     return earned
 
 
@@ -234,6 +245,7 @@ def _search(arrays: ProblemArrays, visits: Visits, unloading: Unloading, j: int,
             unloading.seen_target[at] = search
             slot = visits.first[at]
             while slot != NONE:
+                unloading.number[2] += 1
                 i: int = slot % m
                 if unloading.seen_uav[i] != search and unloading.dead[i] != serving:
                     unloading.seen_uav[i] = search
@@ -248,6 +260,7 @@ def _search(arrays: ProblemArrays, visits: Visits, unloading: Unloading, j: int,
         while head < tail and gives == NONE:
             i = unloading.queue[head]
             for s in range(visits.length[i]):
+                unloading.number[2] += 1
                 j2 = visits.target[i, s]
                 least = ROUNDING * min(arrays.load[0, i, k], arrays.need[0, j2, k])
                 if unloading.amount[s * m + i, k] > least and unloading.seen_target[j2] != search:

@@ -16,6 +16,9 @@ from pydantic import ValidationError
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
 from app.solvers.protocol import Parameters, Solver, SolverContext
 
+_PLANNED_UNLOADING = "app.solvers.unloading.solver:PlannedUnloading"
+"""Lends every algorithm the unloading that is planned."""
+
 
 @dataclass(frozen=True, slots=True)
 class Algorithm:
@@ -137,7 +140,7 @@ def parse_parameters(name: str, given: Mapping[str, Any]) -> Parameters:
 
 
 def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
-    """Load an algorithm's implementation and build it.
+    """Load an algorithm's implementation and build it, able to plan the unloading too.
 
     Raises
     ------
@@ -145,7 +148,7 @@ def create_solver(name: str, parameters: Parameters, context: SolverContext) -> 
         If there is no such algorithm.
     """
     solver = _resolve(algorithm(name).solver)
-    return cast(Solver, solver(parameters, context))
+    return cast(Solver, _resolve(_PLANNED_UNLOADING)(solver(parameters, context)))
 
 
 def _resolve(dotted: str) -> Any:

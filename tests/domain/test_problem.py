@@ -109,7 +109,12 @@ def test_a_record_is_complete_and_comes_back_equal():
     problem = replace(BASE, uavs=(replace(BASE.uavs[0], ret=True, dis=1.0), BASE.uavs[1]))
     record = problem_to_record(problem)
     assert record["uavs"][0]["ret"] == 1
-    assert record["objective"] == {"distance_weight": None, "return_to_base": True, "charge_return": False}
+    assert record["objective"] == {
+        "distance_weight": None,
+        "return_to_base": True,
+        "charge_return": False,
+        "unloading": "greedy",
+    }
     assert problem_from_record(record) == problem
 
 

@@ -1,0 +1,188 @@
+"""Planned unloading around any algorithm (section 3a of the rules, app/simulation/README.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.domain.plan import Actions, Plan
+from app.domain.problem import Problem
+from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.simulator import ALLOWED, replay_delivering
+from app.simulation.unloading import best_deliveries
+from app.solvers.local_search.annealing import actions_of
+from app.solvers.protocol import History, Progress, Report, Solution, Solver, StopCriterion
+from app.solvers.stop import seconds_left
+from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
+
+_ALGORITHM_SHARE = 0.6
+"""Share of the work, and of a time limit, that the algorithm itself has."""
+
+_MOVES_A_VISIT = 8_000
+"""Moves for each visit there can be."""
+
+_MOST_WORK = 60e6
+"""Visits that a search looks at, at most: about a second."""
+
+_PIECE_WORK = 100e3
+"""Visits looked at between two looks at the stop criterion: about 2 ms."""
+
+_ROUNDS = 3
+_HOT, _COLD = 0.03, 0.001
+"""Temperatures of a round at its begin and its end, in largest levels."""
+
+_PATIENT_MOVES_A_VISIT = 1_000
+"""With fewer moves for each visit there can be, a search begins colder: heat would only cost reward."""
+
+
+class PlannedUnloading:
+    """A :class:`~app.solvers.protocol.Solver` that lends planned unloading to another one.
+
+    Where unloading is greedy it only passes the problem on. Where it is planned, the algorithm solves the
+    problem under greedy unloading, so that what it learns stays what the library holds; every plan it reports
+    is unloaded at best; and from the best of these a search with planned unloading goes on. No plan is worse
+    under planned than under greedy unloading, so neither is the answer.
+
+    Parameters
+    ----------
+    algorithm
+        The other one.
+    """
+
+    def __init__(self, algorithm: Solver) -> None:
+        self.algorithm = algorithm
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """See :class:`~app.solvers.protocol.Solver`.
+
+        The history's epochs are the algorithm's, with its rewards, which are those of greedy unloading, and
+        one more for every round of the search.
+        """
+        if problem.objective.unloading == "greedy":
+            return self.algorithm.solve(problem, seed, stop, report)
+        greedy = replace(problem, objective=replace(problem.objective, unloading="greedy"))
+        incumbent = _Incumbent(problem)
+
+        def told(progress: Progress) -> None:
+            incumbent.consider(progress.incumbent)
+            fraction = _ALGORITHM_SHARE * progress.fraction
+            report(Progress(fraction, progress.epoch, incumbent.reward, incumbent.plan))
+
+        solution = self.algorithm.solve(greedy, seed, _ShareOfTime(stop), told)
+        incumbent.consider(solution.plan)
+        history = History(list(solution.history.epoch), list(solution.history.reward))
+        rng = np.random.default_rng([abs(seed), int(seed < 0), 1])
+        _improve(incumbent, rng, stop, report, history)
+        return replace(solution, plan=incumbent.plan, history=history)
+
+
+class _ShareOfTime:
+    """Stops when the given criterion does, or when the algorithm's share of the time limit is over."""
+
+    def __init__(self, stop: StopCriterion) -> None:
+        self._stop = stop
+        left = seconds_left(stop)
+        self._kept = None if left is None else (1 - _ALGORITHM_SHARE) * left
+
+    def __call__(self) -> bool:
+        left = self.seconds_left()
+        return self._stop() or (left is not None and left <= 0)
+
+    def seconds_left(self) -> float | None:
+        left = seconds_left(self._stop)
+        return None if left is None or self._kept is None else left - self._kept
+
+
+class _Incumbent:
+    """The best plan with planned unloading so far; before any, the one that leaves everybody at home."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.arrays = compile_problem(problem)
+        self.plan = Plan.empty(problem.n_uavs, problem.n_targets)
+        self.reward = _reward(self.arrays, self.plan.as_array())
+        self._last: Plan | None = None
+
+    def consider(self, plan: Plan) -> None:
+        """Unload a plan at best, and keep it if it is better."""
+        if plan is self._last:
+            return
+        self._last = plan
+        self.consider_actions(plan.as_array())
+
+    def consider_actions(self, actions: Actions) -> None:
+        """As :meth:`consider`, for (S, M) joint actions."""
+        actions = without_useless(self.arrays, actions)
+        reward = _reward(self.arrays, actions)
+        if reward > self.reward:
+            self.plan, self.reward = Plan.of(actions, self.problem.n_targets), reward
+
+
+def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
+    """Take the visits out of a plan that unload nothing when everything is unloaded at best.
+
+    The way without a visit is not longer and not later, and the deliveries stay possible.
+    """
+    home = arrays.shape[1]
+    while True:
+        useless = (actions < home) & ~(best_deliveries(arrays, actions) > 0).any(axis=2)
+        if not useless.any():
+            return actions
+        shorter = np.full_like(actions, home)
+        for i in range(actions.shape[1]):
+            route = actions[(actions[:, i] < home) & ~useless[:, i], i]
+            shorter[: len(route), i] = route
+        actions = shorter
+
+
+def _reward(arrays: ProblemArrays, actions: Actions) -> float:
+    """Reward of a plan; minus infinity for one that is not legal."""
+    result = replay_delivering(arrays, actions, best_deliveries(arrays, actions))
+    return float(result.reward[0]) if result.rule[0] == ALLOWED else -np.inf
+
+
+def _improve(
+    incumbent: _Incumbent, rng: np.random.Generator, stop: StopCriterion, report: Report, history: History
+) -> None:
+    """Search on from the incumbent."""
+    arrays = incumbent.arrays
+    planned = new_planned_search(arrays, incumbent.plan.as_array())
+    near, epoch = planned.search.near, history.epoch[-1] if history.epoch else 0
+    possible = len(near.active) > 0 and len(near.wanted) > 0
+    visits = arrays.shape[0] * int(arrays.max_steps[0])
+    moves, limit, heat = _MOVES_A_VISIT * visits, seconds_left(stop), 0.0
+    for number in range(1, _ROUNDS + 1):
+        while possible and not stop():
+            share = _share_done(planned, moves, limit, stop) * _ROUNDS - (number - 1)
+            if share >= 1.0:
+                break
+            _piece(planned, rng, moves, heat, max(share, 0.0))
+            done = _share_done(planned, moves, limit, stop)
+            heat = min(1.0, planned.tally[MOVES] / max(done, 1e-9) / (_PATIENT_MOVES_A_VISIT * visits))
+        incumbent.consider_actions(actions_of(planned.search))
+        history.add(epoch + number, incumbent.reward)
+        fraction = _ALGORITHM_SHARE + (1 - _ALGORITHM_SHARE) * number / _ROUNDS
+        report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
+
+
+def _share_done(planned: PlannedSearch, moves: int, limit: float | None, stop: StopCriterion) -> float:
+    """How much of the search is done: by moves, by work, or by the time limit, whichever is most."""
+    left = seconds_left(stop)
+    by_time = 0.0 if left is None or not limit else 1.0 - left / limit
+    return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / _MOST_WORK, by_time))
+
+
+def _piece(planned: PlannedSearch, rng: np.random.Generator, moves: int, heat: float, share: float) -> None:
+    """Anneal for about 2 ms at the temperatures after a share of a round; `heat` 0 keeps to the lowest."""
+    scale = _level_scale(planned.search.arrays)
+    length = max(1, moves // 200)
+    after = min(1.0, share + length * _ROUNDS / moves)
+    hot, cold = (_COLD * (_HOT / _COLD) ** (heat * (1 - at)) * scale for at in (share, after))
+    anneal_planned(planned, rng, hot, cold, length, _PIECE_WORK)
+
+
+def _level_scale(arrays: ProblemArrays) -> float:
+    """Return the largest level of a target that needs anything; never 0."""
+    levels = arrays.level[0][arrays.need_total[0] > 0]
+    return max(float(levels.max(initial=0.0)), 1e-12)
