@@ -73,7 +73,7 @@ class LiveService:
                     return
             except httpx.TransportError:
                 assert self._process is not None
-                assert self._process.poll() is None, f"the service has ended, see {self.log}"
+                assert self._process.poll() is None, self.log.read_text()[-2000:]
             assert time.monotonic() < end, f"{path} did not say yes"
             threading.Event().wait(0.05)
 
