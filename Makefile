@@ -28,6 +28,11 @@ bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_simulator.py
 	$(BIN)/python tests/benchmarks/bench_training.py
 	$(BIN)/python tests/benchmarks/bench_local_search.py
+	$(BIN)/python tests/benchmarks/bench_crash.py --quick
+	$(BIN)/python tests/benchmarks/bench_load.py --quick
+	$(BIN)/python tests/benchmarks/bench_mutations.py --quick
+	-$(BIN)/python tests/benchmarks/bench_overhead.py --quick
+	-$(BIN)/python tests/benchmarks/bench_lateness.py --quick
 
 # Pins everything, from a clean environment: run it after a change of the dependencies.
 constraints:
