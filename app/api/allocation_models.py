@@ -51,6 +51,21 @@ class AllocationRequest(ProblemModel):
         le=MAX_TIME_LIMIT_S,
         description="The answer comes within this time, with the best plan so far; null: no limit",
     )
+    bound: bool = Field(
+        default=False, description="Whether the answer has an upper bound on the reward of any plan"
+    )
+    bound_time_limit_s: float = Field(
+        default=5.0,
+        gt=0,
+        le=MAX_TIME_LIMIT_S,
+        description="Seconds to look for the bound, after the plan was found; within `time_limit_s`, of "
+        "which at most a third is kept for it",
+    )
+
+    @property
+    def bound_seconds(self) -> float | None:
+        """Seconds to look for a bound; None where none is asked for."""
+        return self.bound_time_limit_s if self.bound else None
 
 
 class AnswerModel(BaseModel):
@@ -116,6 +131,15 @@ class Allocation(AnswerModel):
     satisfaction: float = Field(description="Sum over the visits of level · delivered / needed")
     distance: float = Field(description="Total distance, legs home only if they are charged")
     distance_weight: float = Field(description="λ as it was used")
+    bound: float | None = Field(
+        default=None,
+        description="No plan earns more, whichever way it unloads; null unless `bound` was asked for",
+    )
+    gap: float | None = Field(
+        default=None,
+        description="(bound - reward) / bound: the share by which the plan may fall short of the best; null "
+        "without a bound, or where the bound is not positive",
+    )
     routes: list[RouteModel] = Field(description="One a UAV")
     unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
     source_policy: SourcePolicyModel | None = Field(description="What was transferred, if anything")

@@ -17,6 +17,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_from_record, problem_to_record, to_record
+from app.jobs import bounding
 from app.jobs.answer_time import AnswerTime
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
@@ -59,7 +60,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     ----------
     payload
         ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, ``library_url``, the database
-        with the source policies, and ``threads``, how many cores to keep busy.
+        with the source policies, ``threads``, how many cores to keep busy, and ``bound_time_limit_s``, how
+        long to look for a bound, where one is asked for.
     context
         Where progress goes. When it says stop, the best plan so far is the result.
 
@@ -80,7 +82,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     # A job that was stored by an earlier version says nothing of threads.
     solver_context = protocol.SolverContext(payload["library_url"], payload.get("threads", 1))
     solver = create_solver(algorithm, parameters, solver_context)
-    solution = solver.solve(problem, seed, _stop(problem, context), _report(context))
+    bound_limit_s = payload.get("bound_time_limit_s")
+    solution = solver.solve(problem, seed, _stop(problem, context, bound_limit_s), _report(context))
     answer = _explained(problem, solution.plan)
     source = solution.source_policy
     result = {
@@ -88,6 +91,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
         "parameters": solution.parameters.model_dump(mode="json"),
         "seed": seed,
         **answer,
+        **bounding.bound_answer(problem, answer["reward"], bound_limit_s, _stop(problem, context)),
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
     }
@@ -156,6 +160,7 @@ def warm_up() -> None:
         if work.artifact is not None:
             _verify(work.artifact, problem)
     _named(_WARM_UP_TRANSFER)(problem)
+    bounding.warm_up(problem)
     compile_problem(replace(problem, crs="wgs84"))
     # How long answers take here is known before the first one is asked for in a short time.
     larger = generate("uniform", *_SIZE_TIMED, np.random.default_rng(0))
@@ -173,12 +178,15 @@ def _explained(problem: Problem, plan: Plan) -> dict[str, Any]:
     return answer
 
 
-def _stop(problem: Problem, context: WorkContext) -> protocol.StopCriterion:
-    """Stop at a cancellation, or when only the time is left that the answer's way back takes."""
+def _stop(
+    problem: Problem, context: WorkContext, bound_limit_s: float | None = None
+) -> protocol.StopCriterion:
+    """Stop at a cancellation, or when only the time is left that a bound and the answer's way back take."""
     left = context.time_left()
     if left is None:
         return context.cancelled
-    return _StopInTime(context, _answer_time.kept_back(problem, left))
+    reserve = _answer_time.kept_back(problem, left)
+    return _StopInTime(context, reserve + bounding.kept_for_bound(bound_limit_s, left - reserve))
 
 
 class _StopInTime:

@@ -74,6 +74,8 @@ async def allocate(
         "seed": body.seed,
         "library_url": services.database.url,
     }
+    if body.bound_seconds is not None:
+        payload["bound_time_limit_s"] = body.bound_seconds
     job, _ = await services.jobs.submit(
         ALLOCATE,
         # Not part of what makes a request the same: an operator may change it between two tries.

@@ -35,6 +35,14 @@ class MasterSolution(NamedTuple):
     mix: Floats
 
 
+class _Quiet(highspy.Highs):
+    """HiGHS without its banner, which the first of a process prints on standard output as it is built."""
+
+    def enableCallbacks(self) -> None:  # noqa: N802 - HiGHS's name
+        self.setOptionValue("output_flag", False)
+        super().enableCallbacks()  # type: ignore[no-untyped-call]
+
+
 class Master:
     """Columns are routes with what they deliver; rows are the UAVs and the needs.
 
@@ -48,9 +56,8 @@ class Master:
         self._row_of[self._rows] = m + np.arange(len(self._rows))
         self._shape = instance.need.shape
         self._uavs = m
-        self._program = highspy.Highs()  # type: ignore[no-untyped-call]
+        self._program = _Quiet()  # type: ignore[no-untyped-call]
         for option, value in (
-            ("output_flag", False),
             ("threads", 1),
             ("presolve", "off"),
             ("solver", "simplex"),

@@ -16,10 +16,12 @@ from app.solvers.bound.instance import Instance, safely
 from app.solvers.protocol import StopCriterion
 
 _ROUNDS = 3000
-_PATIENCE = 15
+_PATIENCE = 20
 """Rounds without a lower bound after which steps become shorter."""
 
-_SHORTEST_STEP = 1e-4
+_SHORTEST_STEP = 1e-3
+_PIECE = 50_000
+"""Pairs of UAV and target looked at between two looks at the stop criterion: some milliseconds."""
 
 
 def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
@@ -32,45 +34,69 @@ def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
     lower
         Reward of a plan that is known, in the instance's scale; steps are sized by it.
     stop
-        Asked every round; without any round the bound is what meeting every need would earn.
+        Asked every few milliseconds; at first the bound is what meeting every need would earn.
     """
+    ceiling = safely(float(instance.worth.sum()), float(instance.worth.sum()))
+    if stop():
+        return ceiling
+    load = instance.load
     legs = _shortest_legs(instance)
-    most = int(instance.arrays.max_steps[0])
-    needs = np.zeros(instance.need.shape)
-    loads = np.zeros(instance.load.shape)
-    magnitude = float(instance.worth.sum()) + float(np.abs(instance.idle).sum())
-    ceiling, best = safely(float(instance.worth.sum()), magnitude), np.inf
-    best_needs, best_loads = needs.copy(), loads.copy()
+    needs, loads = np.zeros(instance.need.shape), np.zeros(load.shape)
+    best, best_prices = np.inf, (needs, loads)
     step, since = 1.0, 0
     for _ in range(_ROUNDS):
-        if stop() or min(best, ceiling) <= lower or step < _SHORTEST_STEP:
+        met, used = np.zeros(needs.shape), np.zeros(load.shape)
+        total = _earnings(instance, legs, needs, loads, met, used, stop)
+        if total is None:
             break
-        met, used = np.zeros(needs.shape), np.zeros(loads.shape)
-        total = _evaluate(
-            legs, instance.worth, instance.need, instance.load, instance.idle, needs, loads, most, met, used
-        )
-        total += float(needs.sum()) + float((loads * instance.load).sum())
-        bound = safely(total, magnitude + float(needs.sum()) + 2 * float((loads * instance.load).sum()))
-        if bound < best - 1e-6 * abs(bound):
-            since = 0
-        else:
-            since += 1
+        paid = float(needs.sum()) + float((loads * load).sum())
+        bound = safely(total + paid, abs(total) + 2.0 * paid + ceiling)
+        since = 0 if bound < best - 1e-6 * abs(bound) else since + 1
         if bound < best:
-            best, best_needs, best_loads = bound, needs.copy(), loads.copy()
+            best, best_prices = bound, (needs, loads)
+        if min(best, ceiling) <= lower or step < _SHORTEST_STEP:
+            break
         if since > _PATIENCE:
             step, since = step / 2, 0
-            needs, loads = best_needs.copy(), best_loads.copy()
+            needs, loads = best_prices
             continue
-        # Loads are scaled to shares, so that both directions are of the same unit.
-        spare = np.where(instance.load > 0, 1.0 - used / np.where(instance.load > 0, instance.load, 1.0), 0.0)
-        slope_needs = np.where(instance.need > 0, 1.0 - met, 0.0)
-        norm = float((slope_needs**2).sum() + (spare**2).sum())
+        # The loads' prices are moved as if they were of shares too, so that both directions are of one unit.
+        # A price that is 0 and would fall does not count.
+        whole = np.where(load > 0, load, 1.0)
+        down_needs = np.where((instance.need > 0) & ((needs > 0) | (met > 1.0)), 1.0 - met, 0.0)
+        down_loads = np.where((load > 0) & ((loads > 0) | (used > load)), 1.0 - used / whole, 0.0)
+        norm = float((down_needs**2).sum() + (down_loads**2).sum())
         if norm <= 1e-18:
             break
-        length = step * max(total - max(lower, 0.0), 1e-3 * abs(total)) / norm
-        needs = np.maximum(0.0, needs - length * slope_needs)
-        loads = np.maximum(0.0, loads - length * spare / np.where(instance.load > 0, instance.load, 1.0))
+        length = step * max(bound - lower, 1e-3 * abs(bound)) / norm
+        needs = np.maximum(0.0, needs - length * down_needs)
+        loads = np.maximum(0.0, loads - length * down_loads / whole)
     return min(best, ceiling)
+
+
+def _earnings(
+    instance: Instance,
+    legs: Floats,
+    needs: Floats,
+    loads: Floats,
+    met: Floats,
+    used: Floats,
+    stop: StopCriterion,
+) -> float | None:
+    """Return what all UAVs earn at the prices, or None if there was no time to say."""
+    m, n = legs.shape
+    piece = max(1, _PIECE // n)
+    most = int(instance.arrays.max_steps[0])
+    total = 0.0
+    for first in range(0, m, piece):
+        if stop():
+            return None
+        last = min(first + piece, m)
+        total += _evaluate(
+            first, last, most, legs, instance.worth, instance.need, instance.load, instance.idle,
+            needs, loads, met, used,
+        )  # fmt: skip
+    return total
 
 
 def _shortest_legs(instance: Instance) -> Floats:
@@ -89,6 +115,9 @@ def _shortest_legs(instance: Instance) -> Floats:
 
 @njit(cache=True, error_model="numpy")
 def _evaluate(
+    first: int,
+    last: int,
+    most: int,
     legs: Floats,
     worth: Floats,
     need: Floats,
@@ -96,19 +125,16 @@ def _evaluate(
     idle: Floats,
     needs: Floats,
     loads: Floats,
-    most: int,
     met: Floats,
     used: Floats,
 ) -> float:
-    """Return what all UAVs earn at the prices; fill in the shares of needs met and the amounts unloaded."""
-    m, n = legs.shape
-    materials = need.shape[1]
-    gain = np.empty(n)
+    """Return what some UAVs earn at the prices; add to the shares of needs met and the amounts unloaded."""
+    n, materials = need.shape
+    gain, target = np.empty(n), np.empty(n, np.int64)
     total = 0.0
-    for i in range(m):
+    for i in range(first, last):
         count = 0
         for j in range(n):
-            gain[j] = 0.0
             if legs[i, j] == np.inf:
                 continue
             earned = -legs[i, j]
@@ -117,20 +143,20 @@ def _evaluate(
                 if net > 0.0 and load[i, k] > 0.0:
                     earned += net * min(1.0, load[i, k] / need[j, k])
             if earned > 0.0:
-                gain[j] = earned
+                gain[count], target[count] = earned, j
                 count += 1
-        chosen = np.argsort(-gain)[: min(most, count)] if count > 0 else np.empty(0, np.int64)
+        order = np.argsort(-gain[:count])[:most]
         best = 0.0
-        for j in chosen:
-            best += gain[j]
+        for at in order:
+            best += gain[at]
         if best <= idle[i]:
             total += idle[i]
             continue
         total += best
-        for j in chosen:
+        for at in order:
+            j = target[at]
             for k in range(materials):
-                net = worth[j, k] - needs[j, k] - loads[i, k] * need[j, k]
-                if net > 0.0 and load[i, k] > 0.0:
+                if load[i, k] > 0.0 and worth[j, k] - needs[j, k] - loads[i, k] * need[j, k] > 0.0:
                     share = min(1.0, load[i, k] / need[j, k])
                     met[j, k] += share
                     used[i, k] += share * need[j, k]

@@ -1,0 +1,60 @@
+"""How good an answer is: the bound that a request may ask for beside the plan."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from app.domain.problem import Problem
+from app.solvers.bound.instance import new_instance
+from app.solvers.bound.upper_bound import gap, upper_bound
+from app.solvers.bound.visits import visit_bound
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
+
+_LARGEST_SHARE = 1 / 3
+"""Of the time limit of a request, kept for the bound; what the search leaves is the bound's too."""
+
+
+def kept_for_bound(limit_s: float | None, left_s: float) -> float:
+    """Return the seconds of those left that the search leaves to the bound.
+
+    Parameters
+    ----------
+    limit_s
+        How long the bound may take; None: no bound is asked for.
+    left_s
+        Seconds until the request's time is up.
+    """
+    return 0.0 if limit_s is None else min(limit_s, _LARGEST_SHARE * max(0.0, left_s))
+
+
+def bound_answer(
+    problem: Problem, reward: float, limit_s: float | None, stop: StopCriterion
+) -> dict[str, Any]:
+    """Return the bound by the field names of ``POST /allocate``; nulls where it was not asked for.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    reward
+        Of the plan in the answer.
+    limit_s
+        Seconds it may take, or None as above.
+    stop
+        When true, the bound so far is the answer.
+    """
+    if limit_s is None:
+        return {"bound": None, "gap": None}
+    until = time.monotonic() + limit_s
+    found = upper_bound(problem, reward, lambda: time.monotonic() >= until or stop())
+    # The units that the bound is computed in may round a reward that is reached away by a hair.
+    bound = max(found.value, reward)
+    return {"bound": bound, "gap": gap(bound, reward)}
+
+
+def warm_up(problem: Problem) -> None:
+    """Load and compile what bounds of any size need."""
+    upper_bound(problem, None, never)
+    visit_bound(new_instance(problem), 0.0, never)
