@@ -1,0 +1,131 @@
+"""UAVs that decide at the same time, as the paper's do: what the turns within a step are measured against.
+
+All UAVs see the state at the beginning of a step. Their choices are carried out in index order; where an
+earlier UAV has made a visit pointless, the next best one by the same values is taken, as in paper mode.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numba import njit
+
+from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
+from app.learning.universal.observation import FORBIDDEN, look, look_again, new_outlook, observe
+from app.learning.universal.rollout import Played
+from app.learning.universal.unfolding import Turns
+from app.simulation.simulator import act, end_step, new_episodes
+
+
+def unfold_at_once(arrays, problem, plans):
+    """Like :func:`app.learning.universal.unfolding.unfold`, but for what each UAV sees."""
+    episodes, outlook = new_episodes(arrays, len(plans), problem), new_outlook(arrays, len(plans))
+    m, n, _ = arrays.shape
+    most = plans.size
+    turns = Turns(
+        pair=np.empty((most, n, PAIR_FEATURES), np.float32),
+        own=np.empty((most, OWN_FEATURES), np.float32),
+        rivals=np.empty((most, n, m, RIVAL_FEATURES), np.float32),
+        action=np.empty(most, np.int64),
+        episode=np.empty(most, np.int64),
+        step=np.empty(most, np.int64),
+        uav=np.empty(most, np.int64),
+        reward=np.zeros(plans.shape[:2]),
+    )
+    count = _unfold(arrays, episodes, outlook, plans, turns)
+    columns = {name: column[:count] for name, column in turns._asdict().items() if name != "reward"}
+    return Turns(**columns, reward=turns.reward)
+
+
+@torch.inference_mode()
+def play_at_once(agent, arrays, problem, rng=None):
+    """Like :func:`app.learning.universal.rollout.play`, but all UAVs of a step decide on the same state."""
+    m, n, _ = arrays.shape
+    batch, steps = len(problem), int(arrays.max_steps.max())
+    episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
+    look(arrays, episodes, outlook)
+    plans, rewards = np.full((batch, steps, m), n, np.int64), np.zeros(batch)
+    scaled = torch.from_numpy((arrays.between / outlook.extent[:, None, None]).astype(np.float32))
+    bias, hidden = agent.bias(scaled), torch.zeros(m, batch, agent.home.shape[0])
+    pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
+    own = np.empty((batch, OWN_FEATURES), np.float32)
+    rivals = np.empty((batch, n, m, RIVAL_FEATURES), np.float32)
+    turn = np.empty(batch, np.int64)
+    for s in range(steps):
+        preferences = np.zeros((m, batch, n + 1))
+        for i in range(m):
+            count = _observe(arrays, episodes, outlook, i, pair, own, rivals, turn)
+            if not count:
+                continue
+            who = torch.from_numpy(turn[:count])
+            tokens = agent.encode(
+                torch.from_numpy(pair[:count]),
+                torch.from_numpy(own[:count]),
+                torch.from_numpy(rivals[:count]),
+                bias[episodes.problem[turn[:count]]],
+            )
+            hidden[i, who] = agent.remember(tokens, hidden[i, who])
+            logits = agent.logits(agent.values(tokens, hidden[i, who])).numpy()
+            noise = 0.0 if rng is None else rng.gumbel(size=logits.shape)
+            preferences[i, turn[:count]] = logits + noise
+        _take(arrays, episodes, outlook, preferences, plans[:, s], rewards)
+        if episodes.done.all():
+            break
+    return Played(plans, rewards)
+
+
+@njit(error_model="numpy")
+def _unfold(arrays, episodes, outlook, plans, turns):
+    look(arrays, episodes, outlook)
+    count = 0
+    for b in range(plans.shape[0]):
+        for s in range(plans.shape[1]):
+            if episodes.done[b]:
+                break
+            for i in range(plans.shape[2]):
+                if episodes.ret[b, i]:
+                    continue
+                observe(
+                    arrays, episodes, outlook, b, i, turns.pair[count], turns.own[count], turns.rivals[count]
+                )
+                turns.action[count] = plans[b, s, i]
+                turns.episode[count], turns.step[count], turns.uav[count] = b, s, i
+                count += 1
+            for i in range(plans.shape[2]):
+                if not episodes.ret[b, i]:
+                    turns.reward[b, s] += act(arrays, episodes, b, i, plans[b, s, i])
+                    look_again(arrays, episodes, outlook, b, i, plans[b, s, i])
+            turns.reward[b, s] += end_step(arrays, episodes, b)
+    return count
+
+
+@njit(error_model="numpy")
+def _observe(arrays, episodes, outlook, i, pair, own, rivals, turn):
+    count = 0
+    for b in range(episodes.done.shape[0]):
+        if episodes.done[b] or episodes.ret[b, i] or outlook.net[b, i].max() <= FORBIDDEN:
+            continue
+        observe(arrays, episodes, outlook, b, i, pair[count], own[count], rivals[count])
+        turn[count] = b
+        count += 1
+    return count
+
+
+@njit(error_model="numpy")
+def _take(arrays, episodes, outlook, preferences, joint, rewards):
+    n = outlook.net.shape[2]
+    for b in range(episodes.done.shape[0]):
+        if episodes.done[b]:
+            continue
+        for i in range(episodes.ret.shape[1]):
+            if episodes.ret[b, i]:
+                continue
+            action = n
+            for j in range(n):
+                allowed = outlook.net[b, i, j] > FORBIDDEN
+                if allowed and preferences[i, b, j] > preferences[i, b, action]:
+                    action = j
+            joint[b, i] = action
+            rewards[b] += act(arrays, episodes, b, i, action)
+            look_again(arrays, episodes, outlook, b, i, action)
+        rewards[b] += end_step(arrays, episodes, b)
