@@ -7,19 +7,23 @@ import { get, select, set, subscribe } from "../state.js";
 import { timeline } from "../timeline.js";
 
 function figures(answer) {
-  const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight], ["Seconds", answer.elapsed_s, 3]];
-  return h("dl", { class: "figures", id: "figures" }, all.map(([title, value, digits]) => figure(title, value, digits)), boundFigures(answer.bound));
+  const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight, 3], ["Seconds", answer.elapsed_s, 3]];
+  return h("dl", { class: "figures", id: "figures" }, all.map(([title, value, digits]) => figure(title, value, digits)), boundFigures(answer));
 }
 
 function figure(title, value, digits) {
   return h("div", { class: "figure", dataset: { figure: title } }, h("dt", {}, title), h("dd", {}, number(value, digits)));
 }
 
-/** The proven bound and the gap to it, where the answer has them. */
-function boundFigures(bound) {
-  if (bound === null || bound === undefined) return [];
-  const facts = typeof bound === "number" ? { bound } : bound;
-  return Object.entries(facts).filter(([, value]) => typeof value === "number").map(([name, value]) => figure(name.replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase()), value));
+/** The proven bound and the gap to it, where they were asked for. */
+function boundFigures({ bound, gap }) {
+  const facts = [];
+  if (typeof bound === "number") facts.push(figure("Bound", bound));
+  if (typeof gap === "number") {
+    const share = h("data", { value: String(gap), title: String(gap) }, `${shown(100 * gap, 3)} %`);
+    facts.push(h("div", { class: "figure", dataset: { figure: "Gap" } }, h("dt", {}, "Gap"), h("dd", {}, share)));
+  }
+  return facts;
 }
 
 function source(answer) {
