@@ -13,7 +13,8 @@ _STYLE = """
 body { font: 11pt/1.4 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 10mm auto }
 h1 { font-size: 17pt; margin: 0 0 1mm } h2 { font-size: 13pt; margin: 0 0 1mm }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }
-th, td { text-align: left; padding: 1mm 2mm; border-bottom: 1px solid #bbb } td.n, th.n { text-align: right }
+th, td { text-align: left; padding: 1mm 2mm; border-bottom: 1px solid #bbb }
+td.n, th.n { text-align: right } td { white-space: nowrap } td.why { white-space: normal }
 section { break-inside: avoid; margin: 6mm 0 } svg { width: 100%; border: 1px solid #bbb }
 .key { display: inline-block; width: 3mm; height: 3mm; margin-right: 2mm } p { margin: 1mm 0 3mm }
 .done { width: 14mm } @page { margin: 12mm }
@@ -96,7 +97,7 @@ def _unmet(plan: FlownPlan) -> str:
         return "<section><h2>Unmet needs</h2><p>None: every area gets all it needs.</p></section>"
     rows = "".join(
         f'<tr><td>{escape(each.target.id)}</td><td class="n">{each.target.level:g}</td>'
-        f'<td class="n">{_amounts(each.remaining)}</td><td>{escape(each.reason)}</td></tr>'
+        f'<td class="n">{_amounts(each.remaining)}</td><td class="why">{escape(each.reason)}</td></tr>'
         for each in plan.unmet
     )
     return (

@@ -2,7 +2,7 @@
 
 import uPlot from "../vendor/uplot/uplot.js";
 import { h } from "./dom.js";
-import { ROUTE_COLOURS } from "./task_picture.js";
+import { hue } from "./plan.js";
 
 /**
  * Draw curves into an element, instead of what was there.
@@ -39,7 +39,7 @@ export function drawCurves(root, series, { x, height = 260, label }) {
         { label: x },
         ...drawn.map((each, i) => ({
           label: each.name,
-          stroke: ROUTE_COLOURS[i % ROUTE_COLOURS.length],
+          stroke: `oklch(${css.getPropertyValue("--route-l")} ${css.getPropertyValue("--route-c")} ${hue(i)})`,
           width: 2,
           paths: uPlot.paths.stepped({ align: 1 }),
           points: { show: each.points.length < 2 },

@@ -1,8 +1,7 @@
 /** A task, and if there is one its plan, as a small picture. */
 
 import { svg } from "./dom.js";
-
-export const ROUTE_COLOURS = ["#0b6e99", "#c2410c", "#3d7a2a", "#7a3f9d", "#9a6700", "#00736b", "#b0305c", "#475569"];
+import { hue } from "./plan.js";
 
 /**
  * Draw a task.
@@ -33,12 +32,9 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
       ...route.stops.map((stop) => [byId.get(stop.target_id).x, byId.get(stop.target_id).y]),
       [uav.x_s, uav.y_s],
     ].map((place) => at(place).map((value) => value.toFixed(1)).join(","));
-    picture.append(
-      svg("polyline", {
-        points: points.join(" "), fill: "none", stroke: ROUTE_COLOURS[i % ROUTE_COLOURS.length],
-        "stroke-width": 1.6, "stroke-linejoin": "round", "data-uav": route.uav_id,
-      }),
-    );
+    const line = svg("polyline", { points: points.join(" "), class: "route", "data-uav": route.uav_id });
+    line.style.setProperty("--hue", hue(i));
+    picture.append(line);
   });
   const most = Math.max(1e-12, ...task.targets.map((target) => target.level));
   const unmet = new Set(answer?.unmet.map((each) => each.target_id));
