@@ -31,10 +31,10 @@ from app.solvers.stop import Deadline, seconds_left
 _WORK_A_SECOND = 2e7
 """Of :func:`~app.learning.universal.effort.roll_out_work`, on one core; a guess, the deadline holds."""
 
-_POLICY_SHARE = 0.15
+_POLICY_SHARE = 0.03
 """Of the time limit, at most, that goes to the policy's roll-outs."""
 
-_LEAST_S = 0.5
+_LEAST_S = 3.0
 """Time limit below which no policy is loaded: the search reaches what it flies in tens of milliseconds."""
 
 _MOST_WORK = 6e7
