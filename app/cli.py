@@ -23,7 +23,6 @@ from sqlalchemy import make_url
 from app.api.access.keys import KeyStore, Role
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.application import create_application
-from app.api.logs import configure_logs
 from app.api.problem_models import to_problem
 from app.api.receipt_deadline import protocol_with_deadline
 from app.domain.errors import AllocatorError
@@ -31,6 +30,7 @@ from app.domain.records import problem_to_record
 from app.jobs import model
 from app.jobs.work_context import WorkContext
 from app.library.seeding import add_policies, read_policies, seed_library
+from app.logs import configure_logs
 from app.settings import Settings
 from app.solvers.registry import parse_parameters
 from policy_store.backup import back_up

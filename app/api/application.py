@@ -71,7 +71,7 @@ def create_application(settings: Settings) -> FastAPI:
             service = JobService(
                 database,
                 job_kinds(store, limits),
-                LocalExecutor(settings.workers, warm_up=_WARM_UP),
+                LocalExecutor(settings.workers, warm_up=_WARM_UP, log_level=settings.log_level),
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,

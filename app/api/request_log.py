@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import time
 
+from asgi_correlation_id import correlation_id
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from structlog.contextvars import bind_contextvars
 
 from app.api.metrics import Metrics
 
@@ -35,6 +37,8 @@ class RequestLog:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        # Every line that is logged in the course of the request has its id, those of its job included.
+        bind_contextvars(request_id=correlation_id.get())
         begun = time.perf_counter()
         # What raises is answered with 500 outside of this middleware.
         status, answered_s = 500, None

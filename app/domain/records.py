@@ -24,15 +24,15 @@ def problem_to_record(problem: Problem) -> dict[str, Any]:
 def to_record(value: Any) -> Any:
     """Turn a dataclass, and what it holds, into dictionaries, lists and plain values.
 
-    What :func:`dataclasses.asdict` does, without copying what cannot change: a tenth of its time, which counts
-    for problems and plans of a thousand UAVs.
+    What :func:`dataclasses.asdict` does, without copying what cannot change: a fraction of its time, which
+    counts for problems and plans of a thousand UAVs.
     """
     if value is None or isinstance(value, float | int | str):
         return value
     if isinstance(value, tuple | list):
         flat = not value or isinstance(value[0], float | int | str)
         return list(value) if flat else [to_record(each) for each in value]
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, type):
         return {name: to_record(getattr(value, name)) for name in _names(type(value))}
     return value
 

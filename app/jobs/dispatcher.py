@@ -27,6 +27,7 @@ from app.jobs.owner import is_alive
 from app.jobs.run import Run
 from app.jobs.store import Claim, JobStore, QueueLimit
 from app.jobs.writer import Writer
+from app.logs import labels
 
 _PAUSE_S = 0.1
 _SETTLE_S = 20.0
@@ -78,6 +79,8 @@ class Dispatcher:
         self._house = Housekeeping(store, self._writer, self._runs.values, self._look_after, retention_s)
         self._housekeeping: asyncio.Task[None] | None = None
         self._unsettled: list[Run] = []
+        # Of the jobs that wait or run; one that an earlier process took in has lost its request's id.
+        self._labels: dict[str, dict[str, str]] = {}
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
         self._wake = asyncio.Event()
@@ -162,6 +165,7 @@ class Dispatcher:
             raise
         if created:
             _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
+            self._labels[claim.job.id] = labels()
         if created and run_now:
             self._begin(claim)
         elif created:
@@ -247,7 +251,11 @@ class Dispatcher:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
         left = None if claim.deadline is None else claim.deadline - time.time()
         run.execution = self._executor.submit(
-            self._kinds[job.kind].work, job.payload, time_left_s=left, on_progress=on_progress
+            self._kinds[job.kind].work,
+            job.payload,
+            time_left_s=left,
+            on_progress=on_progress,
+            labels={**self._labels.get(job.id, {}), "job_id": job.id},
         )
         if left is not None:
             loop = asyncio.get_running_loop()
@@ -256,7 +264,7 @@ class Dispatcher:
 
     async def _finish(self, run: Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
-        bind_contextvars(job_id=run.job.id)
+        bind_contextvars(**self._labels.get(run.job.id, {}), job_id=run.job.id)
         begun, took = time.monotonic(), None
         job: Job | None = None
         try:
@@ -317,6 +325,7 @@ class Dispatcher:
 
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
+        self._labels.pop(job.id, None)
         self._channels.end(job)
         self._observer.ended(job, ran_s)
         _log.info(

@@ -5,7 +5,7 @@ All of it is called from the event loop's thread, and calls back there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -75,9 +75,11 @@ class Executor(Protocol):
         *,
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
+        labels: Mapping[str, str],
     ) -> Execution:
         """Hand ``"module:function"`` and its payload to a worker; never blocks.
 
+        The lines that the worker logs in its course have the ``labels``, ids by their names.
         ``time_left_s`` may be negative: the work still runs, and sees that its time is up.
         """
 

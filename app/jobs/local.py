@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Mapping, MutableSequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
+from types import MappingProxyType
 from typing import Any, cast
 
 from app.jobs import worker
@@ -54,16 +55,24 @@ class LocalExecutor:
         first work would otherwise wait for. A worker whose warm-up raises is replaced after a pause.
     environment
         Variables of the workers, set before their process starts: the libraries read them as they load.
+    log_level
+        What the workers log at least, to their standard error; None leaves Python's own way.
     """
 
     def __init__(
-        self, slots: int, *, warm_up: str | None = None, environment: Mapping[str, str] = SINGLE_THREADED
+        self,
+        slots: int,
+        *,
+        warm_up: str | None = None,
+        environment: Mapping[str, str] = SINGLE_THREADED,
+        log_level: str | None = None,
     ) -> None:
         if slots < 1:
             raise ValueError(f"slots is {slots}, but at least one worker is needed")
         self._slots = slots
         self._warm_up = warm_up
         self._environment = dict(environment)
+        self._log_level = log_level
         self._workers: set[_Worker] = set()
         self._ready: set[_Worker] = set()
         self._free: asyncio.Queue[_Worker] = asyncio.Queue()
@@ -98,9 +107,12 @@ class LocalExecutor:
         *,
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
+        labels: Mapping[str, str] = MappingProxyType({}),
     ) -> _LocalExecution:
         """Hand work to the next free worker, see :meth:`app.jobs.executor.Executor.submit`."""
-        execution = _LocalExecution(self._free, work, payload, time_left_s, on_progress)
+        execution = _LocalExecution(
+            self._free, partial(worker.run, dict(labels), work, payload), time_left_s, on_progress
+        )
         self._executions.add(execution)
         execution.task.add_done_callback(lambda _task: self._executions.discard(execution))
         return execution
@@ -128,7 +140,7 @@ class LocalExecutor:
 
     async def _live_once(self, on_ready: Callable[[], None]) -> bool:
         """Start one worker and stay until it is gone; False if it never became warm."""
-        slot = _Worker()
+        slot = _Worker(self._log_level)
         self._workers.add(slot)
         try:
             await asyncio.to_thread(slot.start, self._warm_up, self._environment)
@@ -155,13 +167,13 @@ class LocalExecutor:
 class _Worker:
     """A worker process as its parent sees it: pool, progress pipe, control block."""
 
-    def __init__(self) -> None:
+    def __init__(self, log_level: str | None) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, self._their_end = context.Pipe(duplex=False)
         self.control: MutableSequence[float] = cast(
             "MutableSequence[float]", context.RawArray(ctypes.c_double, new_control())
         )
-        initialize = partial(worker.initialize, self._their_end, self.control)
+        initialize = partial(worker.initialize, self._their_end, self.control, log_level)
         self.pool = ProcessPoolExecutor(1, mp_context=context, initializer=initialize)
         self.pid: int | None = None
         self.gone = asyncio.Event()
@@ -232,14 +244,12 @@ class _LocalExecution:
     def __init__(
         self,
         free: asyncio.Queue[_Worker],
-        work: str,
-        payload: dict[str, Any],
+        run: Callable[[int], worker.Ended],
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
     ) -> None:
         self._free = free
-        self._work = work
-        self._payload = payload
+        self._run_with = run
         self._deadline = math.inf if time_left_s is None else time.monotonic() + time_left_s
         self._on_progress = on_progress
         self._cancelled = False
@@ -278,7 +288,7 @@ class _LocalExecution:
             slot.control[DEADLINE] = self._deadline
             slot.begin(serial, self._on_progress)
             try:
-                future = slot.pool.submit(worker.run, serial, self._work, self._payload)
+                future = slot.pool.submit(self._run_with, serial)
             except RuntimeError:
                 continue  # it died while it was idle: its slot brings another
             self._worker = slot

@@ -24,6 +24,7 @@ from app.jobs.executor import Raised, Returned
 from app.jobs.failure import describe
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
+from app.logs import configure_worker_logs, labelled
 
 REPORT_INTERVAL_S = 0.05
 
@@ -107,7 +108,7 @@ class _Equipment:
 _equipment: list[_Equipment] = []
 
 
-def initialize(pipe: Connection, control: MutableSequence[float]) -> None:
+def initialize(pipe: Connection, control: MutableSequence[float], log_level: str | None = None) -> None:
     """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
 
     Parameters
@@ -116,7 +117,11 @@ def initialize(pipe: Connection, control: MutableSequence[float]) -> None:
         Where progress goes, as pairs of serial number and :class:`Progress`.
     control
         Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
+    log_level
+        What is logged at least; None: as Python does it by itself.
     """
+    if log_level is not None:
+        configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, name="parent-watch", daemon=True).start()
     _equipment.append(_Equipment(_Reporter(pipe), control))
@@ -137,13 +142,24 @@ def warm_up(hook: str | None) -> int:
     return os.getpid()
 
 
-def run(serial: int, work: str, payload: dict[str, Any]) -> Ended:
-    """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it."""
+def run(labels: dict[str, str], work: str, payload: dict[str, Any], serial: int) -> Ended:
+    """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
+
+    Parameters
+    ----------
+    labels
+        What the lines have that are logged meanwhile.
+    work, payload
+        ``"module:function"`` and what it gets.
+    serial
+        Tells the progress of this work from that of others.
+    """
     reporter, control = _equipment[0].reporter, _equipment[0].control
     reporter.begin(serial)
     outcome: Returned | Raised
     try:
-        result = resolve(work)(payload, WorkContext(reporter.report, control))
+        with labelled(labels):
+            result = resolve(work)(payload, WorkContext(reporter.report, control))
         # A result that is no JSON must fail here, with a traceback, and not when it is stored.
         json.dumps(result.result, allow_nan=False)
         outcome = Returned(result)

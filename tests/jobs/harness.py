@@ -31,7 +31,7 @@ def kind(name: str, lane: str = "interactive") -> JobKind:
 GATED = JobKind("gated", "job_work:until_file", "interactive", count_completion)
 KINDS = (
     *(kind(name) for name in ("echo", "until_file", "until_stopped", "deaf", "chatter", "epochs", "die")),
-    *(kind(name) for name in ("refuse", "defect", "leave", "not_json", "surroundings")),
+    *(kind(name) for name in ("refuse", "defect", "leave", "not_json", "surroundings", "speak")),
     JobKind("train", "job_work:until_file", "training"),
     GATED,
 )

@@ -1,10 +1,12 @@
 """Work functions that the tests submit; what they wait for are files, so that nothing depends on timing."""
 
+import logging
 import os
 import signal
 import sys
 import threading
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,20 @@ def defect(payload: Payload, context: WorkContext) -> WorkResult:
 
 def leave(payload: Payload, context: WorkContext) -> WorkResult:
     sys.exit(3)
+
+
+def speak(payload: Payload, context: WorkContext) -> WorkResult:
+    """Log in every way there is, and let a thread end with an exception."""
+    logging.getLogger("work").info("said", extra={"said": payload["said"]})
+    warnings.warn("thin ice", stacklevel=1)
+    try:
+        raise ValueError("inner\nline")
+    except ValueError:
+        logging.getLogger("work").exception("caught")
+    thread = threading.Thread(target=lambda: 1 // 0, name="careless")
+    thread.start()
+    thread.join()
+    return WorkResult({})
 
 
 def not_json(payload: Payload, context: WorkContext) -> WorkResult:
