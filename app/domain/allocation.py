@@ -68,12 +68,25 @@ class Unmet:
         The reason, for programs.
     reason
         The reason, for people, with its numbers.
+    uav_id
+        The UAV that could serve it, or comes closest to it; None where there is none.
+    remedy
+        What would change it, for people; None where nothing simple would.
+    reward_change
+        Change of the reward with one more visit to it once the remedy is there, or, without a remedy, as
+        things are; None where that was not evaluated.
+    verified
+        Whether the reason was verified by flying the plan with that visit on the simulator.
     """
 
     target_id: str
     remaining: tuple[float, ...]
     code: str
     reason: str
+    uav_id: str | None = None
+    remedy: str | None = None
+    reward_change: float | None = None
+    verified: bool = False
 
 
 @dataclass(frozen=True, slots=True)

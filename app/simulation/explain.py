@@ -82,7 +82,7 @@ def explain(problem: Problem, plan: Plan) -> Allocation:
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
-        unmet=unmet_targets(problem, arrays, episodes, [len(route.stops) for route in routes]),
+        unmet=unmet_targets(problem, arrays, episodes, actions, delivered, float(result.reward[0])),
     )
 
 

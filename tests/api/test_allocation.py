@@ -79,6 +79,10 @@ def test_minimal_problem_has_the_defaults_of_the_specification(client):
             "remaining": [4.0],
             "code": "not_worth_it",
             "reason": answer["unmet"][0]["reason"],
+            "uav_id": "uav-1",
+            "remedy": "4 of material 1 more aboard uav-1",
+            "reward_change": pytest.approx(1 - 3 * 10**-0.5),
+            "verified": True,
         }
     ]
 

@@ -2,11 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from problems import random_problem
 
+from app.domain.errors import IllegalPlan
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.simulation.explain import explain
+from app.simulation.explain import explain, reward_of
+from app.simulation.generator import generate
+from app.solvers.greedy import greedy_plan
 
 
 def problem(**target):
@@ -52,3 +57,74 @@ def test_step_limit():
 
 def test_a_fully_served_area_is_not_listed():
     assert [u.target_id for u in explain(problem(), Plan(((1,),))).unmet] == ["near"]
+
+
+def test_the_range_that_is_missing_for_one_more_visit():
+    # near and far are both in range, but not one after the other: near, far and home are 1 + 5 + 4.
+    uav = UAV("u", 0, 0, 0, 0, speed=1.0, voyage=9.0, loadlist=(3.0, 0.0))
+    found = reason_for_far(replace(problem(x=-4), uavs=(uav,)), ((0,),))
+    assert (found.code, found.uav_id, found.remedy) == ("range_used", "u", "range +1 of u")
+    assert found.reward_change == pytest.approx((2 - 0.01 * 9) - (1 - 0.01))
+    assert found.verified is True
+
+
+def test_one_more_load_would_do():
+    # far gets 1 of 2 before the range and the steps are used up; there is nothing left to bring.
+    found = reason_for_far(replace(problem(), max_steps=2), ((0,), (1,)))
+    assert (found.code, found.verified) == ("loads_used", True)
+    assert found.remedy == "1 of material 1 more aboard u, one more decision step"
+    assert found.reward_change == pytest.approx(0.5)
+
+
+def relaxed(case, unmet):
+    """The problem with the remedy of a hard reason."""
+    index = [u.id for u in case.uavs].index(unmet.uav_id)
+    uav, uavs, targets = case.uavs[index], list(case.uavs), list(case.targets)
+    amount = float(unmet.reason.split()[-1 if unmet.code == "out_of_range" else -4]) * (1 + 1e-5)
+    if unmet.code == "out_of_range":
+        uavs[index] = replace(uav, voyage=uav.voyage + amount)
+    else:
+        j = [t.id for t in targets].index(unmet.target_id)
+        targets[j] = replace(targets[j], deadline=targets[j].deadline + amount)
+    return replace(case, uavs=tuple(uavs), targets=tuple(targets)), index
+
+
+@pytest.mark.parametrize("unloading", ["greedy", "planned"])
+def test_what_is_said_of_random_plans_holds(unloading):
+    rng = np.random.default_rng(23)
+    codes = set()
+    for _ in range(120):
+        case = random_problem(rng)
+        plan = greedy_plan(case)
+        case = replace(case, objective=replace(case.objective, unloading=unloading))
+        try:
+            answer = explain(case, plan)
+        except IllegalPlan:  # under planned unloading a visit of the greedy rule may be of no use
+            continue
+        for unmet in answer.unmet:
+            codes.add(unmet.code)
+            if unmet.code == "not_chosen":
+                assert unmet.verified
+                assert unmet.reward_change > 0
+            if unmet.code in ("not_worth_it", "loads_used") and unmet.verified:
+                assert (unmet.reward_change > 0) == (unmet.remedy is not None)
+            if unmet.code in ("range_used", "step_limit"):
+                assert unmet.verified
+                assert unmet.reward_change > 0
+            if unmet.code in ("out_of_range", "deadline"):
+                easier, index = relaxed(case, unmet)
+                j = [t.id for t in case.targets].index(unmet.target_id)
+                row = [case.n_targets] * case.n_uavs
+                row[index] = j
+                assert reward_of(easier, Plan((tuple(row),))) is not None
+                with pytest.raises(IllegalPlan):
+                    reward_of(case, Plan((tuple(row),)))
+    assert {"not_worth_it", "out_of_range", "deadline", "loads_used"} <= codes
+
+
+def test_of_very_many_the_most_urgent_are_verified(monkeypatch):
+    monkeypatch.setattr("app.simulation.counterfactual._WORK", 200)
+    case = generate("uniform", 3, 30, 2, np.random.default_rng(2))
+    unmet = explain(case, greedy_plan(case)).unmet
+    assert {u.verified for u in unmet} == {True, False}
+    assert all(u.reward_change is None for u in unmet if not u.verified)
