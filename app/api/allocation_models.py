@@ -98,8 +98,28 @@ class UnmetModel(AnswerModel):
 
     target_id: str = Field(description="The rescue area")
     remaining: list[float] = Field(description="Amounts still needed after the plan, one a material")
-    code: str = Field(description="The reason, for programs")
+    code: str = Field(
+        description="The reason, for programs: `no_supply` (no UAV carries it), `out_of_range`, `deadline`, "
+        "`step_limit`, `range_used` (by the other visits), `loads_used` (on more urgent areas), "
+        "`not_worth_it` (costs more distance than it earns), `not_chosen` (a better plan has been overlooked)"
+    )
     reason: str = Field(description="The reason, for people, with its numbers")
+    uav_id: str | None = Field(
+        default=None, description="The UAV that could serve it, or comes closest to it; null: none"
+    )
+    remedy: str | None = Field(
+        default=None, description="What would change it, for people; null: nothing simple would"
+    )
+    reward_change: float | None = Field(
+        default=None,
+        description="Change of the reward with one more visit to it once the remedy is there, or, without a "
+        "remedy, as things are; null: not evaluated",
+    )
+    verified: bool = Field(
+        default=False,
+        description="Whether the reason was verified by flying the plan with that visit on the simulator; "
+        "of very many unmet areas only the most urgent ones are",
+    )
 
 
 class SourcePolicyModel(AnswerModel):

@@ -159,6 +159,9 @@ def warm_up() -> None:
         work = allocate({**payload, "algorithm": algorithm, "parameters": parameters}, context)
         if work.artifact is not None:
             _verify(work.artifact, problem)
+    unloading = replace(problem, objective=replace(problem.objective, unloading="planned"))
+    planned = {**payload, "problem": problem_to_record(unloading), "algorithm": "greedy", "parameters": {}}
+    allocate(planned, WorkContext.in_process(lambda _progress: None, time_limit_s=None))
     _named(_WARM_UP_TRANSFER)(problem)
     bounding.warm_up(problem)
     compile_problem(replace(problem, crs="wgs84"))
