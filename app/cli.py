@@ -123,6 +123,7 @@ def allocate(
             "seed": request.seed,
             "library_url": settings.resolved_database_url,
             "threads": settings.threads_per_job,
+            "bound_time_limit_s": request.bound_seconds,
         }
         with _library(settings) as (library, database):
             seed_library(library, database)

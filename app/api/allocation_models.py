@@ -137,6 +137,13 @@ class HistoryModel(AnswerModel):
     reward: list[float] = Field(description="Reward at that epoch")
 
 
+class ProofModel(AnswerModel):
+    """What an algorithm knows of plans that it has not found; they unload greedily."""
+
+    bound: float = Field(description="No plan that unloads greedily earns more")
+    proven: bool = Field(description="Whether the plan is the best there is")
+
+
 class Allocation(AnswerModel):
     """A plan, what it earns, and how it was found."""
 
@@ -159,6 +166,10 @@ class Allocation(AnswerModel):
         default=None,
         description="(bound - reward) / bound: the share by which the plan may fall short of the best; null "
         "without a bound, or where the bound is not positive",
+    )
+    proof: ProofModel | None = Field(
+        default=None,
+        description="Of `exact`: whether the plan is proven to be the best, where it unloads greedily",
     )
     routes: list[RouteModel] = Field(description="One a UAV")
     unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")

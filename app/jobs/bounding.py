@@ -9,7 +9,7 @@ from app.domain.problem import Problem
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.upper_bound import gap, upper_bound
 from app.solvers.bound.visits import visit_bound
-from app.solvers.protocol import StopCriterion
+from app.solvers.protocol import Proof, StopCriterion
 from app.solvers.stop import never
 
 _LARGEST_SHARE = 1 / 3
@@ -52,6 +52,13 @@ def bound_answer(
     # The units that the bound is computed in may round a reward that is reached away by a hair.
     bound = max(found.value, reward)
     return {"bound": bound, "gap": gap(bound, reward)}
+
+
+def proof_answer(problem: Problem, proof: Proof | None) -> dict[str, Any] | None:
+    """Return what the algorithm knows, which says nothing of plans whose unloading is planned."""
+    if proof is None or problem.objective.unloading != "greedy":
+        return None
+    return {"bound": proof.bound, "proven": proof.proven}
 
 
 def warm_up(problem: Problem) -> None:

@@ -40,6 +40,7 @@ _WARM_UP_PARAMETERS: dict[str, dict[str, Any]] = {
     "ga": {"num_total": 4, "iteration": 2},
     "local_search": {"moves": 200},
     "auto": {"moves": 200, "policy": False},
+    "exact": {"nodes": 10},
     "dqn": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
     # In service mode nothing that the transfer's warm-up leaves out.
     "qmix": {
@@ -91,6 +92,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
         "parameters": solution.parameters.model_dump(mode="json"),
         "seed": seed,
         **answer,
+        "proof": bounding.proof_answer(problem, solution.proof),
         **bounding.bound_answer(problem, answer["reward"], bound_limit_s, _stop(problem, context)),
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},

@@ -44,3 +44,11 @@ class AutoParameters(LocalSearchParameters):
         description="Whether plans of the nearest policy of the library are among the starts; null: where "
         "that pays, by size and time limit",
     )
+
+
+class ExactParameters(Parameters):
+    """When to give up the proof."""
+
+    nodes: int = Field(
+        default=20_000, ge=0, le=10_000_000, description="Most nodes of the search tree that are looked at"
+    )

@@ -94,6 +94,22 @@ class SourcePolicy:
 
 
 @dataclass(frozen=True, slots=True)
+class Proof:
+    """What an algorithm knows of plans that it has not found.
+
+    Attributes
+    ----------
+    bound
+        No plan that unloads greedily earns more.
+    proven
+        Whether the plan reaches it, so that it is the best there is.
+    """
+
+    bound: float
+    proven: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Solution:
     """What a solver found.
 
@@ -109,6 +125,8 @@ class Solution:
         The transferred policy, if any.
     checkpoint
         What was learned, as a checkpoint of :mod:`app.learning.checkpoint`, or None.
+    proof
+        How good the plan is, if the algorithm knows; of plans that unload greedily.
     """
 
     plan: Plan
@@ -116,6 +134,7 @@ class Solution:
     parameters: Parameters
     source_policy: SourcePolicy | None = None
     checkpoint: bytes | None = None
+    proof: Proof | None = None
 
 
 class Solver(Protocol):

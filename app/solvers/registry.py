@@ -92,6 +92,12 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "app.solvers.parameters:AutoParameters",
         ),
         Algorithm(
+            "exact",
+            "The best plan of a small problem with the proof that none is better; small problems only",
+            "app.solvers.exact:Exact",
+            "app.solvers.parameters:ExactParameters",
+        ),
+        Algorithm(
             "greedy",
             "Every UAV in turn takes the visit that earns most at once; the yardstick",
             "app.solvers.greedy:Greedy",

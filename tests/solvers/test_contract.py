@@ -33,6 +33,7 @@ QUICK = {
     "dqn": LEARNING,
     "ga": {"num_total": 8, "iteration": 10},
     "local_search": {"moves": 3000, "restarts": 1},
+    "exact": {"nodes": 20},
     "auto": {"moves": 3000, "restarts": 1, "policy": True},
 }
 SHAPES = ((2, 3, 2), (3, 4, 1))

@@ -50,6 +50,8 @@ class Priced(NamedTuple):
     ----------
     bound
         Upper bound on every plan within the pools.
+    pools
+        What was evaluated.
     prices
         (N, K).
     values
@@ -59,6 +61,7 @@ class Priced(NamedTuple):
     """
 
     bound: float
+    pools: Pools
     prices: Floats
     values: tuple[Floats, ...]
     best: Floats
@@ -92,7 +95,7 @@ class Relaxation:
         total = float(prices.sum()) + float(best.sum())
         magnitude = float(prices.sum()) + float(np.abs(best).sum()) + float(instance.worth.sum())
         bound = safely(total, magnitude) if np.isfinite(total) else -np.inf
-        return Priced(bound, prices, tuple(values), best)
+        return Priced(bound, pools, prices, tuple(values), best)
 
     def restrict(self, pools: Pools) -> None:
         """Let the master use the columns of these pools only; those there are too many of are forgotten."""

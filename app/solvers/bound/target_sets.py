@@ -23,7 +23,7 @@ Members = npt.NDArray[np.int16]
 MAX_TARGETS = 62
 """Targets whose sets fit the bits of an integer."""
 
-_SLACK = 2.0 * TOLERANCE
+SLACK = 2.0 * TOLERANCE
 """Wider than the simulator's own tolerance, so that rounding never loses a route that it allows."""
 
 
@@ -74,8 +74,8 @@ def sets_of(instance: Instance, i: int) -> TargetSets:
         np.ascontiguousarray(arrays.between[0][np.ix_(targets, targets)]),
         np.ascontiguousarray(arrays.home[0, i, targets]),
         float(arrays.speed[0, i]),
-        float(arrays.voyage[0, i]) * (1.0 + _SLACK) - float(arrays.dis[0, i]),
-        arrays.deadline[0, targets] + _SLACK * np.abs(arrays.deadline[0, targets]),
+        float(arrays.voyage[0, i]) * (1.0 + SLACK) - float(arrays.dis[0, i]),
+        arrays.deadline[0, targets] + SLACK * np.abs(arrays.deadline[0, targets]),
         np.ascontiguousarray(arrays.service[0, targets]),
         bool(arrays.return_to_base[0]),
         bool(arrays.charge_return[0]),

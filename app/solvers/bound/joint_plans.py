@@ -1,0 +1,258 @@
+"""Every plan of a part of the search tree that could beat the incumbent, flown one after the other.
+
+At the node's prices a plan earns at most the bound less the sum of its UAVs' slacks (README.md): so only
+routes with little slack are combined, and only as long as their slacks leave something to gain. What a plan
+earns is the simulator's word, which knows who unloads first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.solvers.bound.instance import Instance
+from app.solvers.bound.relaxation import Pools, Priced
+from app.solvers.bound.target_sets import SLACK, Members, TargetSets
+from app.solvers.protocol import StopCriterion
+
+_MOST_ROUTES = 20_000
+"""Routes of a UAV that are combined; a node with more is branched."""
+
+_MOST_PLANS = 200_000
+"""Steps of the enumeration after which a node is rather branched: some tenths of a second."""
+
+_PIECE = 2_000
+"""Steps between two looks at the stop criterion: a few milliseconds."""
+
+
+class JointPlans:
+    """A :class:`~app.solvers.bound.tree.Closing` for plans that unload greedily.
+
+    Attributes
+    ----------
+    actions
+        (S, M) the best plan found, or None.
+    """
+
+    def __init__(self, instance: Instance, sets: tuple[TargetSets, ...], stop: StopCriterion) -> None:
+        self.actions: Integers | None = None
+        self._instance, self._sets, self._stop = instance, sets, stop
+        self._episodes = new_episodes(instance.arrays, 1)
+
+    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002
+        """Fly all plans of the node; None if there are too many while something is left to ask."""
+        arrays, m = self._instance.arrays, len(pools.sets)
+        decided = all(len(pool) + int(idle) <= 1 for pool, idle in zip(pools.sets, pools.idle, strict=True))
+        room = priced.bound - lower
+        routes = []
+        for i in range(m):
+            found = self._routes(priced, pools, i, room)
+            if found is None or self._stop():
+                return None
+            routes.append(found)
+        offset = np.concatenate(([0], np.cumsum([len(found[1]) for found in routes]))).astype(np.int64)
+        targets = np.concatenate([found[0] for found in routes])
+        length = np.concatenate([found[1] for found in routes])
+        slack = np.concatenate([found[2] for found in routes])
+        order = np.argsort(np.diff(offset), kind="stable")
+        cursor, spent = np.zeros(m + 1, np.int64), np.zeros(m + 1)
+        cursor[0] = offset[order[0]]
+        best, chosen, level = np.array([lower]), np.full(m, -1), np.zeros(1, np.int64)
+        steps = 0
+        while True:
+            if _explore(
+                arrays, self._episodes, order, offset, targets, length, slack, cursor, spent, level,
+                priced.bound, self._instance.scale, best, chosen, _PIECE,
+            ):  # fmt: skip
+                break
+            steps += _PIECE
+            if self._stop() or (steps > _MOST_PLANS and not decided):
+                self._keep(chosen, targets, length)
+                return None
+        self._keep(chosen, targets, length)
+        return float(best[0])
+
+    def _keep(self, chosen: Integers, targets: Members, length: Integers) -> None:
+        if chosen[0] < 0:
+            return
+        steps, m = int(self._instance.arrays.max_steps[0]), len(chosen)
+        self.actions = np.full((steps, m), self._instance.arrays.level.shape[1], np.int64)
+        for i, q in enumerate(chosen):
+            self.actions[: length[q], i] = targets[q, : length[q]]
+
+    def _routes(
+        self, priced: Priced, pools: Pools, i: int, room: float
+    ) -> tuple[Members, Integers, Floats] | None:
+        """Return targets, lengths and slacks of UAV `i`'s routes, least slack first."""
+        instance, own, arrays = self._instance, self._sets[i], self._instance.arrays
+        pool = pools.sets[i]
+        # The pool may have lost sets since the prices were evaluated.
+        worth = self._worth(priced, i, pool)
+        targets, length, slack = _orders(
+            own.members, own.size, own.cost, pool, priced.best[i] - worth, room, instance.price,
+            int(arrays.max_steps[0]), arrays.start_target[0, i], arrays.between[0], arrays.home[0, i],
+            float(arrays.speed[0, i]),
+            float(arrays.voyage[0, i]) * (1.0 + SLACK) - float(arrays.dis[0, i]),
+            arrays.deadline[0] + SLACK * np.abs(arrays.deadline[0]), arrays.service[0],
+            bool(arrays.return_to_base[0]), bool(arrays.charge_return[0]), _MOST_ROUTES,
+        )  # fmt: skip
+        if len(length) >= _MOST_ROUTES:
+            return None
+        if pools.idle[i]:
+            targets = np.concatenate([targets, np.zeros((1, targets.shape[1]), np.int16)])
+            length = np.append(length, 0)
+            slack = np.append(slack, priced.best[i] - instance.idle[i])
+        first = np.argsort(slack, kind="stable")
+        return targets[first], length[first], slack[first]
+
+    def _worth(self, priced: Priced, i: int, pool: Integers) -> Floats:
+        worth = np.full(len(self._sets[i].size), -np.inf)
+        worth[priced.pools.sets[i]] = priced.values[i]
+        return worth[pool]
+
+
+@njit(cache=True, error_model="numpy")
+def _orders(
+    members: Members,
+    size: Integers,
+    cost: Floats,
+    pool: Integers,
+    slack: Floats,
+    room: float,
+    price: float,
+    longest: int,
+    start: Floats,
+    between: Floats,
+    home: Floats,
+    speed: float,
+    reach: float,
+    latest: Floats,
+    service: Floats,
+    must_return: bool,
+    charged: bool,
+    most: int,
+) -> tuple[Members, Integers, Floats]:
+    """Return the legal orders of a UAV's sets whose slack fits the room, `most` of them at most."""
+    targets = np.zeros((most, longest), np.int16)
+    length, loss = np.zeros(most, np.int64), np.zeros(most)
+    found = 0
+    order, used = np.zeros(longest + 1, np.int64), np.zeros(longest + 1, np.bool_)
+    flown, clock = np.zeros(longest + 1), np.zeros(longest + 1)
+    for at in range(len(pool)):
+        r, s = pool[at], size[pool[at]]
+        if slack[at] > room:
+            continue
+        depth = 0
+        order[0] = -1
+        used[:] = False
+        while depth >= 0:
+            if order[depth] >= 0:
+                used[order[depth]] = False
+            t = order[depth] + 1
+            while t < s:
+                if not used[t]:
+                    j = members[r, t]
+                    d = start[j] if depth == 0 else between[members[r, order[depth - 1]], j]
+                    way = flown[depth] + d
+                    arrival = clock[depth] + d / speed
+                    back = home[j] if must_return else 0.0
+                    if way + back <= reach and arrival <= latest[j] + 1e-12 * arrival:
+                        break
+                t += 1
+            if t >= s:
+                depth -= 1
+                continue
+            order[depth] = t
+            if depth + 1 == s:
+                total = slack[at] + price * (way + (home[j] if charged else 0.0)) - cost[r]
+                if total <= room:
+                    if found == most:
+                        return targets, length, loss
+                    for p in range(s):
+                        targets[found, p] = members[r, order[p]]
+                    length[found], loss[found] = s, total
+                    found += 1
+                continue
+            used[t] = True
+            flown[depth + 1], clock[depth + 1] = way, arrival + service[j]
+            depth += 1
+            order[depth] = -1
+    return targets[:found].copy(), length[:found].copy(), loss[:found].copy()
+
+
+@compiled
+def _fly(
+    arrays: ProblemArrays, episodes: Episodes, choice: Integers, targets: Members, length: Integers
+) -> float:
+    """Return the reward of one plan, minus infinity if it is not legal."""
+    reset_one(arrays, episodes, 0)
+    m = arrays.load.shape[1]
+    reward, s, going = 0.0, 0, True
+    while going:
+        going = False
+        for i in range(m):
+            q = choice[i]
+            if s < length[q]:
+                going = True
+                if verdict(arrays, episodes, 0, i, targets[q, s]) != ALLOWED:
+                    return -np.inf
+                reward += act(arrays, episodes, 0, i, targets[q, s])
+        s += 1
+    for i in range(m):
+        reward += act(arrays, episodes, 0, i, arrays.level.shape[1])
+    return reward
+
+
+@njit(cache=True, error_model="numpy")
+def _explore(
+    arrays: ProblemArrays,
+    episodes: Episodes,
+    order: Integers,
+    offset: Integers,
+    targets: Members,
+    length: Integers,
+    slack: Floats,
+    cursor: Integers,
+    spent: Floats,
+    level: Integers,
+    bound: float,
+    scale: float,
+    best: Floats,
+    chosen: Integers,
+    steps: int,
+) -> bool:
+    """Go on with the enumeration; True once it is complete.
+
+    ``cursor[l]`` is the route of the l-th UAV in `order`, ``spent[l]`` the slack of those before it.
+    """
+    m = len(order)
+    choice = np.zeros(m, np.int64)
+    at = level[0]
+    for before in range(at):
+        choice[order[before]] = cursor[before]
+    for _ in range(steps):
+        if at == m:
+            reward = _fly(arrays, episodes, choice, targets, length) / scale
+            if reward > best[0] + 1e-12:
+                best[0] = reward
+                chosen[:] = choice
+            at -= 1
+            cursor[at] += 1
+            continue
+        i, q = order[at], cursor[at]
+        if q >= offset[i + 1] or spent[at] + slack[q] > bound - best[0]:
+            if at == 0:
+                level[0] = 0
+                return True
+            at -= 1
+            cursor[at] += 1
+            continue
+        choice[i] = q
+        spent[at + 1] = spent[at] + slack[q]
+        at += 1
+        if at < m:
+            cursor[at] = offset[order[at]]
+    level[0] = at
+    return False

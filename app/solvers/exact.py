@@ -1,0 +1,68 @@
+"""The best plan of a small problem, with the proof that there is no better one."""
+
+from __future__ import annotations
+
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.simulation.explain import reward_of
+from app.solvers.bound.instance import new_instance
+from app.solvers.bound.joint_plans import JointPlans
+from app.solvers.bound.tree import PROVEN, Tree
+from app.solvers.bound.upper_bound import enumerate_sets
+from app.solvers.bound.visits import visit_bound
+from app.solvers.local_search.solver import LocalSearch
+from app.solvers.parameters import ExactParameters, LocalSearchParameters
+from app.solvers.protocol import History, Progress, Proof, Report, Solution, SolverContext, StopCriterion
+
+_SEARCH_SHARE = 0.1
+"""Of the progress bar, for the local search that finds the first incumbent."""
+
+
+class Exact:
+    """A :class:`~app.solvers.protocol.Solver` for greedy unloading; an epoch is a node of the search tree.
+
+    Branch and bound with the bounds of :mod:`app.solvers.bound`, from the local search's plan. Where a node
+    has few plans left that could be better, the simulator flies them all.
+    """
+
+    def __init__(self, parameters: ExactParameters, context: SolverContext) -> None:
+        self.parameters = parameters
+        self._context = context
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """See :class:`~app.solvers.protocol.Solver`; the solution has a proof."""
+
+        def searching(progress: Progress) -> None:
+            report(Progress(_SEARCH_SHARE * progress.fraction, 0, progress.best_reward, progress.incumbent))
+
+        plan = LocalSearch(LocalSearchParameters(), self._context).solve(problem, seed, stop, searching).plan
+        reward = reward_of(problem, plan)
+        history = History()
+        history.add(0, reward)
+        instance = new_instance(problem)
+        lower = reward / instance.scale
+        sets = enumerate_sets(instance, stop)
+        if sets is None:
+            bound = max(reward, visit_bound(instance, lower, stop) * instance.scale)
+            return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
+        joint = JointPlans(instance, sets, stop)
+        tree = Tree(instance, sets, lower, joint)
+        most = self.parameters.nodes
+        while not tree.proven and not stop() and tree.nodes < most:
+            tree.run(stop, tree.nodes + 1)
+            if joint.actions is not None:
+                found = Plan.of(joint.actions, problem.n_targets)
+                earned = reward_of(problem, found)
+                if earned > reward:
+                    plan, reward = found, earned
+                    history.add(tree.nodes, reward)
+            fraction = _SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * tree.nodes / most
+            report(Progress(min(1.0, fraction), tree.nodes, reward, plan))
+        if history.epoch[-1] < tree.nodes:
+            history.add(tree.nodes, reward)
+        bound = max(reward, tree.bound * instance.scale)
+        return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
+
+
+def _proof(bound: float, reward: float, scale: float) -> Proof:
+    return Proof(float(bound), bool(bound - reward <= 2.0 * PROVEN * scale))
