@@ -1,0 +1,180 @@
+"""Allocating on the dashboard: the form is what the API describes, the answer on screen is its answer."""
+
+import json
+
+import httpx
+import pytest
+from playwright.sync_api import expect
+from referee import replay
+
+
+@pytest.fixture
+def ready(page):
+    expect(page.locator("html")).to_have_attribute("data-ready", "true")
+    page.wait_for_selector("[data-example=paper-5x10]")
+    page.click("[data-example=paper-5x10]")
+    expect(page.locator(".symbol.targets")).to_have_count(10)
+    page.click("#tab-allocate")
+    page.wait_for_selector("#start")
+    return page
+
+
+def start(page, algorithm, limit="", parameters=None):
+    page.select_option("select[name=algorithm]", algorithm)
+    page.fill("input[name=time_limit_s]", limit)
+    if parameters:
+        page.locator("#parameters").evaluate("details => { details.open = true; }")
+    for name, value in (parameters or {}).items():
+        page.fill(f"#parameters input[name={name}]", value)
+    page.click("#start")
+
+
+def newest_job(service):
+    summary = httpx.get(f"{service.url}/jobs?limit=1").json()["jobs"][0]
+    return httpx.get(f"{service.url}/jobs/{summary['id']}").json()
+
+
+def figure(page, title):
+    return json.loads(page.locator(f"[data-figure='{title}'] data").get_attribute("value"))
+
+
+def numbers(cell):
+    return [json.loads(each.get_attribute("value")) for each in cell.locator("data").all()]
+
+
+def test_every_parameter_of_every_algorithm_can_be_set(ready, service):
+    for algorithm in httpx.get(f"{service.url}/algorithms").json()["algorithms"]:
+        ready.select_option("select[name=algorithm]", algorithm["name"])
+        names = ready.locator("#parameters :is(input, select)").evaluate_all(
+            "all => all.map((each) => each.name)"
+        )
+        assert set(names) == set(algorithm["parameters"]["properties"])
+        for name, value in algorithm["defaults"].items():
+            shown = ready.locator(f"#parameters [name={name}]").input_value()
+            assert shown == (
+                "" if value is None else str(value).lower() if isinstance(value, bool) else shown
+            )
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                assert float(shown) == value
+
+
+def test_the_answer_on_screen_is_the_services(ready, service):
+    page = ready
+    start(page, "ga", parameters={"iteration": "30"})
+    page.wait_for_selector("#figures")
+    job = newest_job(service)
+    answer = job["result"]
+    problem = httpx.get(f"{service.url}/examples/paper-5x10").json()
+
+    assert answer["parameters"]["iteration"] == 30
+    assert replay(problem, answer["assignment"])["reward"] == pytest.approx(answer["reward"])
+    for title, name in (("Reward", "reward"), ("Satisfaction", "satisfaction"), ("Distance", "distance")):
+        assert figure(page, title) == answer[name]
+    assert figure(page, "λ") == answer["distance_weight"]
+    assert figure(page, "Seconds") == answer["elapsed_s"]
+
+    flown = [route for route in answer["routes"] if route["stops"]]
+    on_map = {
+        path.get_attribute("data-uav-id"): path.get_attribute("data-stops").split("\n")
+        for path in page.locator("path.route").all()
+    }
+    assert on_map == {route["uav_id"]: [stop["target_id"] for stop in route["stops"]] for route in flown}
+    rows = page.locator("#routes tbody tr").all()
+    stops = [(route["uav_id"], stop) for route in flown for stop in route["stops"]]
+    assert len(rows) == len(stops)
+    for row, (uav_id, stop) in zip(rows, stops, strict=True):
+        cells = row.locator("td")
+        assert row.get_attribute("data-uav-id") == uav_id
+        assert cells.nth(1).inner_text() == stop["target_id"]
+        assert numbers(cells.nth(2)) == [stop["arrival_time"]]
+        assert numbers(cells.nth(3)) == stop["delivered"]
+    visits = page.locator(".timeline .visit").evaluate_all("all => all.map((each) => each.dataset.targetId)")
+    assert visits == [stop["target_id"] for _, stop in stops]
+
+    unmet = page.locator("#unmet > li").all()
+    assert [item.get_attribute("data-target-id") for item in unmet] == [
+        each["target_id"] for each in answer["unmet"]
+    ]
+    for item, expected in zip(unmet, answer["unmet"], strict=True):
+        assert numbers(item) == expected["remaining"]
+        assert item.get_attribute("data-code") == expected["code"]
+        assert expected["reason"] in item.inner_text()
+
+
+def test_the_transferred_policy_is_named(ready, service):
+    start(ready, "transfer_qmix", "1.5")
+    ready.wait_for_selector("#figures")
+    source = newest_job(service)["result"]["source_policy"]
+    shown = ready.locator("#source")
+    expect(shown).to_contain_text(source["name"])
+    assert numbers(shown) == [source["distance"]]
+
+
+def test_the_reward_climbs_live_and_stopping_keeps_the_best(ready, service):
+    page = ready
+    start(page, "ga", parameters={"iteration": "1000000"})
+    page.wait_for_selector("path.route")
+    expect(page.locator("#reward-chart .uplot")).to_be_visible()
+    expect(page.locator("#job-status")).to_have_text("running")
+    first = page.locator("#progress data").first.get_attribute("value")
+    assert json.loads(first) <= newest_job(service)["progress"]["best_reward"]
+    page.click("#cancel")
+    page.wait_for_selector("#figures")
+    job = newest_job(service)
+
+    assert job["status"] == "cancelled"
+    assert figure(page, "Reward") == job["result"]["reward"]
+
+
+def test_refusals_stand_at_their_fields(ready):
+    page = ready
+    page.expected_troubles.append("422")
+    start(page, "ga", limit="-1")
+    place = page.locator("[data-pointer='/time_limit_s']")
+    expect(place.locator("input")).to_have_attribute("aria-invalid", "true")
+    expect(place.locator(".error")).to_contain_text("greater than 0")
+
+    page.fill("input[name=time_limit_s]", "1")
+    page.locator("#parameters").evaluate("details => { details.open = true; }")
+    page.fill("#parameters input[name=iteration]", "many")
+    page.click("#start")
+    expect(page.locator("[data-pointer='/parameters/iteration'] .error")).to_be_visible()
+    expect(place.locator(".error")).to_be_hidden()
+
+
+def test_a_refusal_of_the_problem_leads_to_its_cell(ready):
+    page = ready
+    page.expected_troubles.append("422")
+    page.click("#tab-problem")
+    page.click("[data-table=uavs]")
+    page.locator("table[data-kind=uavs] tr[data-id=uav-2] td[data-column=speed]").dblclick()
+    page.keyboard.type("-1")
+    page.keyboard.press("Enter")
+    page.click("#tab-allocate")
+    page.click("#start")
+    page.locator("#violations button").click()
+    cell = page.locator("table[data-kind=uavs] tr[data-id=uav-2] td[data-column=speed]")
+    expect(cell).to_have_attribute("aria-invalid", "true")
+    expect(cell).to_be_focused()
+
+
+def test_an_answer_that_is_out_of_date_says_so(ready):
+    page = ready
+    start(page, "greedy")
+    page.wait_for_selector("#figures")
+    expect(page.locator("#stale")).to_be_hidden()
+    page.locator(".symbol.targets").first.click()
+    page.locator("#map").focus()
+    page.keyboard.press("Delete")
+    expect(page.locator("#stale")).to_be_visible()
+
+
+def test_the_keyboard_alone_allocates(ready):
+    page = ready
+    page.select_option("select[name=algorithm]", "greedy")
+    page.keyboard.press("Control+Enter")
+    page.wait_for_selector("#figures")
+    expect(page.locator("#tab-answer")).to_have_attribute("aria-selected", "true")
+    page.locator("#tab-answer").focus()
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator("#tab-allocate")).to_be_focused()
