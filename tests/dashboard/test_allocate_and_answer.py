@@ -178,3 +178,13 @@ def test_the_keyboard_alone_allocates(ready):
     page.locator("#tab-answer").focus()
     page.keyboard.press("ArrowLeft")
     expect(page.locator("#tab-allocate")).to_be_focused()
+
+
+def test_the_bound_and_the_gap_to_it_are_shown_where_asked_for(ready, service):
+    page = ready
+    page.select_option("[data-pointer='/bound'] select", "true")
+    start(page, "local_search", "2")
+    page.wait_for_selector("[data-figure=Gap]")
+    answer = newest_job(service)["result"]
+    assert (figure(page, "Bound"), figure(page, "Gap")) == (answer["bound"], answer["gap"])
+    assert answer["bound"] >= answer["reward"]
