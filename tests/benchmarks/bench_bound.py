@@ -65,7 +65,8 @@ def check_small(count: int) -> None:
 def gaps(seconds: float, each: int) -> None:
     """Print a row a family and size."""
     print(
-        f"{'family':>10} {'M x N':>7} {'gap %':>7} {'worst':>7} {'tight':>6} {'s':>6} {'exact %':>8} {'proven':>7}"
+        f"{'family':>10} {'M x N':>7} {'gap %':>7} {'worst':>7} {'tight':>6} {'s':>6} {'exact %':>8} "
+        f"{'proven':>7}"
     )
     everything = []
     for family in FAMILIES:
