@@ -19,7 +19,7 @@ from app.learning.universal.observation import (
     new_outlook,
     observe,
 )
-from app.learning.universal.turn_order import reorder, reorder_plans, restore_plans
+from app.learning.universal.turn_order import reorder, restore_plans
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
 from app.solvers.protocol import StopCriterion
@@ -49,7 +49,6 @@ def play(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
-    kept: Integers | None = None,
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
 
@@ -68,8 +67,6 @@ def play(
         Of the sampling; less is greedier.
     stop
         Asked before every turn; once it is true, everybody who is still out flies home.
-    kept
-        (B, S, M) actions that are taken instead wherever they are allowed; negative where the policy decides.
     """
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
@@ -106,12 +103,9 @@ def play(
             if rng is not None:
                 noise = rng.gumbel(size=logits.shape).astype(np.float32)
                 logits = logits / temperature + torch.from_numpy(noise)
-            actions = logits.argmax(dim=1).numpy()
-            if kept is not None:
-                wanted = kept[turn[:count], s, i]
-                possible = logits.numpy()[np.arange(count), np.maximum(wanted, 0)] > -np.inf
-                actions = np.where((wanted >= 0) & possible, wanted, actions)
-            _act_turn(arrays, episodes, outlook, i, turn[:count], actions, plans[:, s], rewards)
+            _act_turn(
+                arrays, episodes, outlook, i, turn[:count], logits.argmax(dim=1).numpy(), plans[:, s], rewards
+            )
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
             break
@@ -126,7 +120,6 @@ def play_in_orders(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
-    kept: Integers | None = None,
 ) -> Integers:
     """Play one problem with its UAVs taking turns in several orders; return plans (Q * repeats, S, M).
 
@@ -135,8 +128,8 @@ def play_in_orders(
 
     Parameters
     ----------
-    agent, rng, temperature, stop, kept
-        As :func:`play` has them; what is kept is by the indices that the problem has.
+    agent, rng, temperature, stop
+        As :func:`play` has them.
     arrays
         A stack of one problem.
     orders
@@ -149,9 +142,7 @@ def play_in_orders(
         **{name: np.repeat(column, count, axis=0) for name, column in arrays._asdict().items()}
     )
     episodes = np.repeat(np.arange(count), repeats)
-    if kept is not None:
-        kept = reorder_plans(kept, orders[episodes])
-    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop, kept)
+    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop)
     return restore_plans(played.plans, orders[episodes])
 
 

@@ -23,8 +23,8 @@ from app.learning.universal.fine_tuning import FineTuning, require_memory
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
 from app.learning.universal.rollout import play, play_in_orders
-from app.learning.universal.turn_order import draw_orders, some_orders
-from app.simulation.arrays import Integers, compile_problem
+from app.learning.universal.turn_order import some_orders
+from app.simulation.arrays import compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
@@ -141,37 +141,22 @@ class UniversalTransfer:
         return max(found, key=lambda each: each[1])
 
     def _sample(self, policy: UniversalPolicy) -> None:
-        """Sample whole episodes, then as many in which UAVs of the best plan so far keep their routes."""
         done, samples = 0, self._used.samples
-        freely = -(-samples // 2)
         while done < samples and not self._stop():
-            begun = freely if done < freely else samples
-            count = batch_of(self._arrays, begun - done)
-            orders = self._orders[:count] if done < freely else self._drawn_orders(count)
-            episodes = -(-count // len(orders)) * len(orders)
-            kept = None if done < freely else self._keep_some(episodes)
+            count = batch_of(self._arrays, samples - done)
+            orders = self._orders[: max(1, min(count, len(self._orders)))]
             plans = play_in_orders(
                 policy.agent,
                 self._arrays,
                 orders,
-                episodes // len(orders),
+                -(-count // len(orders)),
                 self._sampling,
                 _TEMPERATURE,
                 self._stop,
-                kept,
-            )
-            self._best.consider(plans[:count])
+            )[:count]
+            self._best.consider(plans)
             done += count
             self._tell("samples", done / samples)
-
-    def _drawn_orders(self, most: int) -> Integers:
-        return draw_orders(min(most, len(self._orders)), self._problem.n_uavs, self._sampling)
-
-    def _keep_some(self, episodes: int) -> Integers:
-        """Actions (B, S, M) of the best plan for a random half of the UAVs, in each episode; else -1."""
-        plans = np.repeat(self._best.actions[None], episodes, axis=0)
-        decides = self._sampling.random((episodes, 1, self._problem.n_uavs)) < 0.5
-        return np.where(decides, -1, plans)
 
     def _fine_tune(self, policy: UniversalPolicy) -> bytes | None:
         """Fine-tune a copy; its checkpoint, or None where no epoch was done."""

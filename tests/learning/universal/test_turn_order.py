@@ -51,20 +51,3 @@ def test_roll_outs_come_in_the_order_asked_for(make_policy):
     assert np.array_equal(plans[0], plans[1])
     assert np.array_equal(plans[:1], play(agent, arrays, np.zeros(1, np.int64)).plans)
     assert not all(np.array_equal(plans[0], other) for other in plans[2:])
-
-
-def test_kept_routes_are_flown_where_they_are_allowed(make_policy):
-    rng = np.random.default_rng(4)
-    problem = generate("mixed_loads", 5, 10, 3, rng)
-    arrays, agent = compile_problem(problem), make_policy(2).agent
-    best = play(agent, arrays, np.zeros(1, np.int64), rng).plans
-    orders = some_orders(4, 5, rng)
-    whole = play_in_orders(agent, arrays, orders[:1], 3, rng, kept=np.repeat(best, 3, axis=0))
-    assert all(np.array_equal(plan, best[0]) for plan in whole)
-    kept = np.where(np.arange(5) == 1, best, -1)
-    only = play_in_orders(agent, arrays, orders[:1], kept=kept)[0]
-    assert only[0, 1] == best[0, 0, 1]
-    assert replay(problem_to_record(problem), only.tolist())["reward"] > -np.inf
-    renumbered = play_in_orders(agent, arrays, orders, kept=kept.repeat(4, axis=0))
-    # In the first step nothing has been unloaded yet but by those before it in the order.
-    assert sum(plan[0, 1] == best[0, 0, 1] for plan in renumbered) >= 2
