@@ -16,9 +16,10 @@ from app.solvers.local_search.effort import default_moves
 _MOST_WORK = 6e7
 """Work of a greedy roll-out that is done without being asked for; some seconds."""
 
-_ORDERING_WORK = 3e6
-"""Work of all greedy roll-outs of a policy together."""
+_CHOOSING_WORK = 3e6
+"""Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
 
+_POLICIES = 4
 _ORDERS = 8
 
 _SAMPLING_WORK = 6e6
@@ -32,7 +33,7 @@ _TUNING_WORK = 3e5
 _EPOCHS = 2
 """Within two seconds the search brings more than further epochs; these leave a policy to register."""
 
-_POLISH_SHARE = 0.7
+_POLISH_SHARE = 0.65
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 
@@ -44,13 +45,16 @@ class Effort:
     ----------
     policy
         Whether a policy is rolled out at all.
+    policies
+        Policies of the shortlist that are tried, at least 1.
     orders
-        Orders of UAVs in which a policy is rolled out, at least 1.
+        Orders of UAVs in which each is rolled out, at least 1.
     samples, n_epochs, polish_moves
         By the names of the parameters.
     """
 
     policy: bool
+    policies: int
     orders: int
     samples: int
     n_epochs: int
@@ -60,9 +64,11 @@ class Effort:
 def effort(arrays: ProblemArrays) -> Effort:
     """Return what a problem is given by default."""
     work = roll_out_work(arrays)
+    orders = int(np.clip(_CHOOSING_WORK / (_POLICIES * work), 1, _ORDERS))
     return Effort(
         policy=work <= _MOST_WORK,
-        orders=int(np.clip(_ORDERING_WORK / work, 1, _ORDERS)),
+        policies=int(np.clip(_CHOOSING_WORK / (orders * work), 1, _POLICIES)),
+        orders=orders,
         samples=int(min(_SAMPLES, _SAMPLING_WORK / work)),
         n_epochs=_EPOCHS if work <= _TUNING_WORK else 0,
         polish_moves=round(_POLISH_SHARE * default_moves(arrays)),

@@ -128,10 +128,10 @@ class UniversalTransfer:
     def _roll_out(self, sources: Sequence[Source]) -> tuple[Source, float]:
         """Play each policy greedily; return the best, among equals the nearest, and what it earned."""
         found: list[tuple[Source, float]] = []
-        tried, orders = sources, self._orders
+        tried, orders = sources[: self._effort.policies], self._orders
         if self._used.is_bare:
             # As many roll-outs as of one policy in all orders, which earn no more.
-            tried, orders = sources[:_TRIED_AT_SIGHT], orders[: -(-len(orders) // _TRIED_AT_SIGHT)]
+            tried, orders = tried[:_TRIED_AT_SIGHT], orders[: -(-len(orders) // _TRIED_AT_SIGHT)]
         for source in tried:
             policy = cast(UniversalPolicy, source.network)
             plans = play_in_orders(policy.agent, self._arrays, orders, stop=self._stop)
