@@ -48,7 +48,7 @@ def browsing() -> Iterator[Browser]:
             started.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service(tmp_path_factory) -> Iterator[LiveService]:
     running = LiveService(tmp_path_factory.mktemp("dashboard"), workers=1).start()
     try:
@@ -57,7 +57,7 @@ def service(tmp_path_factory) -> Iterator[LiveService]:
         running.stop()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     with browsing() as started:
         yield started

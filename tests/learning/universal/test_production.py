@@ -19,8 +19,7 @@ PARAMETERS = UniversalTrainingParameters(
 )
 
 
-def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
-    monkeypatch.setattr("app.learning.universal.curriculum.SHAPES", ((3, 4, 1.0),))
+def test_a_second_run_finds_everything_done(tmp_path):
     told, threads = [], torch.get_num_threads()
     folder, work = tmp_path / "library", tmp_path / "work"
     production = Production(work, PARAMETERS, 2, lambda stage, share, said: told.append((stage, share)))
