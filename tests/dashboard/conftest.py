@@ -27,9 +27,11 @@ PATIENCE_MS = 20_000
 
 
 def pytest_collection_modifyitems(items):
+    here = Path(__file__).parent
+    # Playwright keeps an event loop running in the main thread, where other tests run loops of their own.
+    items.sort(key=lambda item: here in item.path.parents)
     if Path(CHROMIUM).exists() or os.environ.get("REQUIRE_BROWSER") == "1":
         return
-    here = Path(__file__).parent
     for item in items:
         if here in item.path.parents and "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.skip(reason=HOW_TO_GET_ONE))
@@ -48,7 +50,7 @@ def browsing() -> Iterator[Browser]:
             started.close()
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="session")
 def service(tmp_path_factory) -> Iterator[LiveService]:
     running = LiveService(tmp_path_factory.mktemp("dashboard"), workers=1).start()
     try:
@@ -57,7 +59,7 @@ def service(tmp_path_factory) -> Iterator[LiveService]:
         running.stop()
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     with browsing() as started:
         yield started
