@@ -15,7 +15,7 @@ _FIXED_S = 0.015
 
 _WHOLE_ANSWER = 2.5
 """Time of a large answer from plan to socket, in times of its explanation: stored and sent as JSON, it is
-read and written four times. Measured from 100x300 to 1000x2000."""
+read and written four times. An estimate, not measured as a whole."""
 
 _LARGEST_SHARE = 0.25
 """Of a short time limit the search keeps most, and the answer is late by what it takes."""

@@ -222,7 +222,9 @@ class _Judge:
         if now.helps and now.elsewhere >= self._elsewhere(j) - self._least:
             says = f"one more visit would cost {max(0.0, -gain):.6g} more in distance than it earns"
             return self._unmet(j, NOT_WORTH_IT, says, i, remedy, outcome)
-        says = f"what there is serves more elsewhere: bringing it here would cost {max(0.0, -gain):.6g}"
+        says = "what there is serves as much elsewhere"
+        if gain < 0:
+            says = f"what there is serves more elsewhere: bringing it here would cost {-gain:.6g}"
         return self._unmet(j, LOADS_USED, says, i, remedy, outcome)
 
     def _elsewhere(self, j: int) -> float:
