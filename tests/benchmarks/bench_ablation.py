@@ -8,6 +8,7 @@ fresh problems greedily, once each, in the order their UAVs have. Printed is the
 search of 400,000 moves, ± the standard deviation over seeds.
 
 - full: as ``python -m app train-universal`` learns, but for its random orders of UAVs and its later steps;
+- Adam: in place of Muon on the matrices, at the learning rate that suits it;
 - no demonstrations: own sampled episodes and the TD loss alone;
 - no turns: all UAVs of a step decide on the state at its beginning (``at_once.py``);
 - VDN: Q_tot is the sum of the agents' values;
@@ -53,6 +54,7 @@ from app.learning.universal.demonstrations import demonstrate, read_shard  # noq
 from app.learning.universal.learner import Learner, make_batch  # noqa: E402
 from app.learning.universal.mixer import UniversalMixer  # noqa: E402
 from app.learning.universal.network import UniversalAgent  # noqa: E402
+from app.learning.universal.optimiser import adam, muon  # noqa: E402
 from app.learning.universal.rollout import play  # noqa: E402
 from app.learning.universal.unfolding import unfold  # noqa: E402
 from app.simulation.arrays import ProblemArrays  # noqa: E402
@@ -63,7 +65,7 @@ from app.solvers.greedy import greedy_plan  # noqa: E402
 M, N, K = 7, 15, 3
 LEARNED, TRIED = 1024, 64
 MOVES = {LEARNED: 60_000, TRIED: 400_000}
-LR, TD_WEIGHT, OWN_EVERY, TD_EVERY, WARM_UP = 2e-3, 0.2, 16, 4, 30
+LR, MUON_LR, TD_WEIGHT, OWN_EVERY, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 16, 4, 30
 EPISODES = 24
 """An update of every variant."""
 
@@ -105,10 +107,12 @@ class Variant:
     turns: bool = True
     mixer: bool = True
     memory: bool = True
+    muon: bool = True
 
 
 VARIANTS = {
     "full": Variant(),
+    "Adam": Variant(muon=False),
     "no demonstrations": Variant(demonstrations=False),
     "no turns": Variant(turns=False),
     "VDN": Variant(mixer=False),
@@ -163,7 +167,8 @@ def train(name, seed, seconds, shown):
         torch.manual_seed(seed)
         agent = (UniversalAgent if variant.memory else ForgetfulAgent)(CONFIG.width, CONFIG.layers)
         mixer = UniversalMixer(CONFIG.width, CONFIG.qmix_hidden_dim) if variant.mixer else Sum()
-    learner = Learner(agent, mixer, lr=LR, td_weight=TD_WEIGHT)
+    lr, optimisers = (MUON_LR, muon) if variant.muon else (LR, adam)
+    learner = Learner(agent, mixer, lr=lr, td_weight=TD_WEIGHT, optimisers=optimisers)
     every, clock = np.arange(EPISODES), Clock(seconds)
     while clock.share < 1:
         rng = np.random.default_rng([seed, clock.updates])

@@ -18,6 +18,7 @@ from torch.nn import functional
 from app.learning.universal.mixer import UniversalMixer
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.observation import scales
+from app.learning.universal.optimiser import MakeOptimisers, adam
 from app.learning.universal.unfolding import Turns
 from app.simulation.arrays import ProblemArrays
 
@@ -104,13 +105,15 @@ class Learner:
     agent, mixer
         Trained in place.
     lr
-        Learning rate of Adam at its highest; see :meth:`update`.
+        Learning rate at its highest; see :meth:`update`.
     td_weight
         Weight of the TD loss beside the cross-entropy.
     gamma, td_lambda
         Discount and trace of the TD targets.
     polyak
         Share by which the target networks follow at every update.
+    optimisers
+        Makes what steps the weights.
     """
 
     def __init__(
@@ -123,6 +126,7 @@ class Learner:
         gamma: float = 0.99,
         td_lambda: float = 0.8,
         polyak: float = 0.01,
+        optimisers: MakeOptimisers = adam,
     ) -> None:
         self.agent, self.mixer = agent, mixer
         self.target_agent, self.target_mixer = copy.deepcopy(agent), copy.deepcopy(mixer)
@@ -132,7 +136,7 @@ class Learner:
         self._targets = nn.ModuleList((self.target_agent, self.target_mixer))
         self._targets.requires_grad_(False)
         self.networks = nn.ModuleList((self._trained, self._targets))
-        self.optimiser = torch.optim.AdamW(self._trained.parameters(), lr=lr, weight_decay=1e-4)
+        self.optimisers = optimisers(self._trained, lr)
 
     def update(self, batch: Batch, share_of_lr: float, *, imitate: bool, bootstrap: bool) -> dict[str, float]:
         """Take one step, and return the losses by name: ``imitation``, ``td``.
@@ -148,8 +152,9 @@ class Learner:
         bootstrap
             Adds the TD loss; at least one of the two.
         """
-        for group in self.optimiser.param_groups:
-            group["lr"] = self._lr * share_of_lr
+        for optimiser in self.optimisers:
+            for group in optimiser.param_groups:
+                group["lr"] = self._lr * share_of_lr
         online = evaluate(self.agent, batch)
         losses = {}
         if imitate:
@@ -157,10 +162,11 @@ class Learner:
             losses["imitation"] = functional.cross_entropy(logits, batch.action)
         if bootstrap:
             losses["td"] = self._td_weight * self._td_loss(batch, online)
-        self.optimiser.zero_grad(set_to_none=True)
+        self._trained.zero_grad(set_to_none=True)
         torch.stack(list(losses.values())).sum().backward()  # type: ignore[no-untyped-call]  # untyped in torch
         nn.utils.clip_grad_norm_(self._trained.parameters(), 1.0)
-        self.optimiser.step()
+        for optimiser in self.optimisers:
+            optimiser.step()
         with torch.no_grad():
             for slow, fast in zip(self._targets.parameters(), self._trained.parameters(), strict=True):
                 slow.lerp_(fast, self._polyak)

@@ -1,11 +1,10 @@
 """Making the library's policies for every size from nothing; every stage goes on where it stopped.
 
 1. Near-optimal plans of generated problems are searched.
-2. A policy is fitted to them.
-3. Plans of new problems are searched, beginning from what that policy does.
-4. The policy is fitted further, to those: the general policy.
-5. For each family of problems a copy of it is fitted to that family's plans alone: a specialised policy.
-6. Each is measured on fresh problems of every family and written.
+2. A policy is fitted to them: the general policy.
+3. For each family plans of new problems are searched, beginning from what that policy does, and a copy of it
+   is fitted to those alone: a specialised policy.
+4. Each is measured on fresh problems of every family and written.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -48,7 +47,6 @@ _FRESH = 1_000_003
 """Keeps the streams of the metrics' problems apart from those of the demonstrations."""
 
 SEARCHED = Series("demonstrations")
-IMPROVED = Series("improved", (1,))
 
 GENERAL = "every family, every size"
 """Name of the general policy."""
@@ -57,15 +55,12 @@ GENERAL = "every family, every size"
 class UniversalTrainingParameters(Parameters):
     """What a training of policies for every size is made with."""
 
-    shards: int = Field(default=240, ge=1, description="Files of searched plans, up to 64 problems each")
-    updates: int = Field(default=5000, ge=1, description="Steps of the optimiser on them")
-    lr: float = Field(default=2e-3, gt=0, description="Highest learning rate of Adam on them")
-    improved_shards: int = Field(default=80, ge=1, description="Files of plans searched from the policy's")
-    improved_updates: int = Field(default=1000, ge=1, description="Steps of the optimiser on those")
-    improved_lr: float = Field(default=7e-4, gt=0, description="Highest learning rate on those")
+    shards: int = Field(default=120, ge=1, description="Files of searched plans, up to 64 problems each")
+    updates: int = Field(default=3500, ge=1, description="Steps of the optimiser on them")
+    lr: float = Field(default=1e-2, gt=0, description="Highest learning rate on them")
     family_shards: int = Field(default=4, ge=1, description="Files of plans of one family")
     family_updates: int = Field(default=150, ge=1, description="Steps of the optimiser on a family")
-    family_lr: float = Field(default=3e-4, gt=0, description="Highest learning rate on a family")
+    family_lr: float = Field(default=1e-3, gt=0, description="Highest learning rate on a family")
     td_weight: float = Field(default=0.2, ge=0, description="Weight of the TD loss beside the cross-entropy")
     width: int = Field(default=64, ge=4, multiple_of=4, description="Width of a token")
     layers: int = Field(default=2, ge=1, description="Attention layers")
@@ -113,11 +108,8 @@ class Production:
         self.work.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         p = self.parameters
-        searched = self._shards(SEARCHED, p.shards, None)
-        first = self._fit("searched", None, searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
-        improved = self._shards(IMPROVED, p.improved_shards, first)
-        schedule = Schedule(p.improved_updates, p.improved_lr, p.td_weight, p.seed)
-        general = self._fit("general", first, improved, schedule)
+        searched = self._shards(SEARCHED, p.shards)
+        general = self._fit("general", searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
         specialised = self._specialise(general)
         measured = self._measured()
         files = [self._write(folder / f"{name}.safetensors", general, GENERAL, tuple(FAMILIES), measured)]
@@ -126,19 +118,18 @@ class Production:
             files.append(self._write(file, state, f"{family}, every size", (family,), measured))
         return files
 
-    def _shards(self, series: Series, count: int, policy: Path | None) -> list[Path]:
-        job = partial(_write_shard, self.work, series, self.parameters, policy)
+    def _shards(self, series: Series, count: int) -> list[Path]:
+        job = partial(write_shard, self.work, series, self.parameters.seed)
         return self._in_processes(series.name, job, range(count))
 
-    def _fit(self, stage: str, start: Path | None, shards: list[Path], schedule: Schedule) -> Path:
+    def _fit(self, stage: str, shards: list[Path], schedule: Schedule) -> Path:
         """Fit in this process, with all threads; return the state."""
         state = self.work / f"{stage}.safetensors"
         before = torch.get_num_threads()
         torch.set_num_threads(self.workers)
         try:
-            _fit(
-                start, shards, schedule, state, self.parameters.config, partial(self._watch, stage, schedule)
-            )
+            watch = partial(self._watch, stage, schedule)
+            _fit(None, shards, schedule, state, self.parameters.config, watch)
         finally:
             torch.set_num_threads(before)
         return state
@@ -199,19 +190,6 @@ def greedy_ratio(policy: UniversalPolicy, measured: Path) -> float:
     return float(np.mean(played.rewards / shown.rewards))
 
 
-@lru_cache(maxsize=1)
-def _policy(state: Path, config: UniversalConfig) -> UniversalPolicy:
-    torch.set_num_threads(1)
-    return UniversalPolicy.of_training(state, config)
-
-
-def _write_shard(
-    work: Path, series: Series, parameters: UniversalTrainingParameters, policy: Path | None, number: int
-) -> Path:
-    agent = None if policy is None else _policy(policy, parameters.config).agent
-    return write_shard(work, series, parameters.seed, number, agent)
-
-
 def _fit(
     start: Path | None,
     shards: list[Path],
@@ -228,9 +206,11 @@ def _fit(
 
 def _specialise(work: Path, parameters: UniversalTrainingParameters, general: Path, family: str) -> Path:
     """Make a family's demonstrations and fit a copy of the general policy to them, in one thread."""
+    torch.set_num_threads(1)
     p, state = parameters, work / f"family-{family}.safetensors"
-    series = Series(f"improved-{family}", (2, *family.encode()), (family,))
-    shards = [_write_shard(work, series, p, general, number) for number in range(p.family_shards)]
+    agent = UniversalPolicy.of_training(general, p.config).agent
+    series = Series(f"demonstrations-{family}", (2, *family.encode()), (family,))
+    shards = [write_shard(work, series, p.seed, number, agent) for number in range(p.family_shards)]
     schedule = Schedule(p.family_updates, p.family_lr, p.td_weight, p.seed)
     _fit(general, shards, schedule, state, p.config)
     return state

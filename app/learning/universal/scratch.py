@@ -1,9 +1,7 @@
 """QMIX in service mode: a policy for every size, learned on one problem from nothing.
 
 It plays episodes on the problem, learns from what they earned, and imitates the best plan it has seen, which
-is the greedy rule's at first. Imitation makes the policy ever surer of that plan; so that it goes on looking,
-its actions are drawn at a temperature that rises while episodes repeat what is known and falls while they do
-not.
+is the greedy rule's at first.
 """
 
 from __future__ import annotations
@@ -18,20 +16,14 @@ from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.rollout import play
+from app.learning.universal.temperature import Temperature
 from app.simulation.arrays import ProblemArrays, compile_problem
-from app.simulation.explain import rewards_of
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
 
 LEARNING_RATE = 1e-3
 """Of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
-
-_REPEATED = 0.2
-"""Share of episodes as good as the best plan above which it gets warmer; with none of them it cools."""
-
-_WARMER = 1.15
-_HOTTEST = 50.0
 
 
 def fits(arrays: ProblemArrays) -> bool:
@@ -82,16 +74,12 @@ class UniversalScratch:
             return self._solution(0)
         self._best.consider(greedy_plan(self._problem).as_array()[None])
         self._evaluate(0)
-        temperature = 1.0
+        temperature = Temperature(self._arrays)
         while done < epochs and not self._stop():
             count = min(self._tuning.episodes, epochs - done)
-            plans = self._tuning.epoch(self._best.actions, self._stop, count, temperature)
-            known = rewards_of(self._arrays, plans).reward >= self._best.reward - 1e-9
+            plans = self._tuning.epoch(self._best.actions, self._stop, count, temperature.value)
+            temperature.follow(plans, self._best.reward)
             self._best.consider(plans)
-            if not known.any():
-                temperature = max(1.0, temperature / _WARMER)
-            elif known.mean() > _REPEATED:
-                temperature = min(_HOTTEST, temperature * _WARMER)
             done += count
             if (done - count) // every < done // every or done == epochs:
                 self._evaluate(done)

@@ -23,6 +23,7 @@ from app.learning.universal.demonstrations import Demonstrations, read_shard
 from app.learning.universal.learner import Batch, Learner, make_batch
 from app.learning.universal.mixer import UniversalMixer
 from app.learning.universal.network import UniversalAgent
+from app.learning.universal.optimiser import muon
 from app.learning.universal.rollout import play
 from app.learning.universal.turn_order import draw_orders, reorder, reorder_plans
 from app.learning.universal.unfolding import of_uavs, unfold
@@ -43,7 +44,7 @@ TD_EVERY = 4
 """Every so many updates the TD loss is added; it needs the target networks' values, so it is not cheap."""
 
 WARM_UP = 200
-"""Updates over which the learning rate rises."""
+"""Updates over which the learning rate rises, at most a tenth of all."""
 
 SAVE_EVERY = 200
 """Updates between two states on disk."""
@@ -58,7 +59,7 @@ class Schedule:
     updates
         Steps of the optimiser.
     lr
-        Highest learning rate; it rises over ``WARM_UP`` updates and falls as a half cosine to the end.
+        Highest learning rate; it rises over some updates and falls as a half cosine to the end.
     td_weight
         Weight of the loss of QMIX beside the cross-entropy.
     seed
@@ -66,13 +67,14 @@ class Schedule:
     """
 
     updates: int
-    lr: float = 2e-3
+    lr: float = 1e-2
     td_weight: float = 0.2
     seed: int = 123
 
     def share_of_lr(self, update: int) -> float:
         """Return what part of the learning rate an update takes."""
-        return min(1.0, (update + 1) / WARM_UP) * (0.5 + 0.5 * float(np.cos(np.pi * update / self.updates)))
+        rising = min(WARM_UP, max(1, self.updates // 10))
+        return min(1.0, (update + 1) / rising) * (0.5 + 0.5 * float(np.cos(np.pi * update / self.updates)))
 
 
 Watch = Callable[[int, dict[str, float]], None]
@@ -105,7 +107,7 @@ def fit(
     watch
         Told the number of updates done and running means of the losses.
     """
-    learner = Learner(agent, mixer, lr=schedule.lr, td_weight=schedule.td_weight)
+    learner = Learner(agent, mixer, lr=schedule.lr, td_weight=schedule.td_weight, optimisers=muon)
     done = _resume(learner, state) if state.exists() else 0
     means: dict[str, float] = {}
     with ThreadPoolExecutor(1) as ahead:
@@ -182,8 +184,9 @@ def _own(agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator)
 
 def _save(learner: Learner, done: int, path: Path) -> None:
     tensors = {f"networks.{name}": tensor for name, tensor in learner.networks.state_dict().items()}
-    for number, slots in learner.optimiser.state_dict()["state"].items():
-        tensors |= {f"optimiser.{number}.{name}": tensor for name, tensor in slots.items()}
+    for place, optimiser in enumerate(learner.optimisers):
+        for number, slots in optimiser.state_dict()["state"].items():
+            tensors |= {f"optimiser.{place}.{number}.{name}": tensor for name, tensor in slots.items()}
     partial = path.with_suffix(".part")
     save_file(tensors, partial, {"updates": str(done)})
     os.replace(partial, path)
@@ -195,12 +198,13 @@ def _resume(learner: Learner, path: Path) -> int:
         name.removeprefix("networks."): t for name, t in tensors.items() if name.startswith("networks.")
     }
     learner.networks.load_state_dict(networks, strict=True)
-    slots: dict[int, dict[str, torch.Tensor]] = {}
-    for name, tensor in tensors.items():
-        if name.startswith("optimiser."):
-            _, number, slot = name.split(".")
-            slots.setdefault(int(number), {})[slot] = tensor
-    groups = learner.optimiser.state_dict()["param_groups"]
-    learner.optimiser.load_state_dict({"state": slots, "param_groups": groups})
+    for place, optimiser in enumerate(learner.optimisers):
+        slots: dict[int, dict[str, torch.Tensor]] = {}
+        for name, tensor in tensors.items():
+            if name.startswith(f"optimiser.{place}."):
+                number, slot = name.split(".")[2:]
+                slots.setdefault(int(number), {})[slot] = tensor
+        groups = optimiser.state_dict()["param_groups"]
+        optimiser.load_state_dict({"state": slots, "param_groups": groups})
     with safe_open(path, framework="pt") as file:
         return int(file.metadata()["updates"])

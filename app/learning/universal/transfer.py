@@ -23,6 +23,7 @@ from app.learning.universal.fine_tuning import FineTuning, require_memory
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
 from app.learning.universal.rollout import play, play_in_orders
+from app.learning.universal.temperature import Temperature
 from app.learning.universal.turn_order import some_orders
 from app.simulation.arrays import compile_problem
 from app.simulation.simulator import new_episodes
@@ -172,9 +173,11 @@ class UniversalTransfer:
             gamma=parameters.gamma,
             rng=self._tuning,
         )
-        done = 0
+        done, temperature = 0, Temperature(self._arrays)
         while done < used.n_epochs and not self._stop():
-            best.consider(tuning.epoch(best.actions, self._stop))
+            plans = tuning.epoch(best.actions, self._stop, temperature=temperature.value)
+            temperature.follow(plans, best.reward)
+            best.consider(plans)
             done += 1
             if done % parameters.evaluate_per_epoch == 0 or done == used.n_epochs:
                 played = play(tuning.policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)

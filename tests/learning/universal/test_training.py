@@ -18,7 +18,8 @@ from app.simulation import simulator
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 
-SMALL = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+SMALL = UniversalConfig(width=16, layers=1, qmix_hidden_dim=4)
+"""Wide enough for both of the optimisers."""
 SERIES = Series("some", (4,), ("uniform", "scarce"))
 
 
@@ -90,6 +91,9 @@ def test_learning_rate_rises_and_falls():
     assert max(shares) > 0.99
     assert shares.index(max(shares)) == 199
     assert shares[-1] < 1e-4
+    short = [Schedule(50).share_of_lr(update) for update in range(50)]
+    assert short.index(max(short)) == 4
+    assert max(short) > 0.97
 
 
 def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
