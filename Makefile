@@ -38,7 +38,7 @@ bench: .venv/installed
 constraints:
 	rm -rf .venv-constraints
 	$(PYTHON) -m venv .venv-constraints
-	.venv-constraints/bin/pip install --quiet ".[dev,compare]"
+	.venv-constraints/bin/pip install --quiet ".[dev]"
 	.venv-constraints/bin/pip freeze --exclude uav-allocator --exclude pip --exclude setuptools | sed 's/+cpu$$//' > constraints.txt
 	rm -rf .venv-constraints
 

@@ -2,8 +2,8 @@
 
 Run: ``python tests/benchmarks/bench_optimisers.py [--seconds 1] [--sizes 5x10 10x20 20x30] [--problems 2]``.
 PyVRP and OR-Tools are an extra: ``pip install -e ".[compare]"``. What they cannot express is listed in
-``general_optimisers.py``. One core each. Every plan is replayed by the tests' referee, an illegal one counts
-as 0 and is counted; figures are the mean ratio to the best of the three on each problem.
+``app/reproduction/general_optimisers.py``. One core each. Every plan is replayed by the tests' referee, an
+illegal one counts as 0 and is counted; figures are the mean ratio to the best of the three on each problem.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from statistics import fmean
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "support")]
 
 import numpy as np  # noqa: E402
-from general_optimisers import pyvrp_plan, require, routing_plan  # noqa: E402
 from referee import Illegal, replay  # noqa: E402
 
 from app.domain.plan import Plan  # noqa: E402
 from app.domain.problem import Problem  # noqa: E402
 from app.domain.records import problem_to_record  # noqa: E402
+from app.reproduction.errors import MissingPackage  # noqa: E402
+from app.reproduction.general_optimisers import pyvrp_plan, require, routing_plan  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
@@ -45,8 +46,11 @@ def main() -> None:
     options.add_argument("--sizes", nargs="+", default=["5x10", "10x20", "20x30"])
     options.add_argument("--problems", type=int, default=2)
     given = options.parse_args()
-    require("pyvrp")
-    require("ortools")
+    try:
+        require("pyvrp")
+        require("ortools")
+    except MissingPackage as missing:
+        sys.exit(str(missing))
     auto_plan(generate("uniform", 3, 4, 3, np.random.default_rng(0)), 0.1, 0)
     print(f"{given.seconds} s each; sizes {' '.join(given.sizes)}; {given.problems} problems each")
     print(f"{'family':<14}" + "".join(f"{name:>10}" for name in OPTIMISERS) + f"{'illegal':>10}")

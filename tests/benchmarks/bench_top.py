@@ -23,12 +23,13 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "support")]
 
-from general_optimisers import pyvrp_plan, require  # noqa: E402
 from referee import replay  # noqa: E402
 
 from app.domain.plan import Plan  # noqa: E402
 from app.domain.problem import UAV, Objective, Problem, Target  # noqa: E402
 from app.domain.records import problem_to_record  # noqa: E402
+from app.reproduction.errors import MissingPackage  # noqa: E402
+from app.reproduction.general_optimisers import pyvrp_plan, require  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
 from app.solvers.stop import Deadline  # noqa: E402
@@ -89,7 +90,10 @@ def main() -> None:
     options.add_argument("--pyvrp", action="store_true")
     given = options.parse_args()
     if given.pyvrp:
-        require("pyvrp")
+        try:
+            require("pyvrp")
+        except MissingPackage as missing:
+            sys.exit(str(missing))
     # What is compiled or loaded at a first call is not the search's.
     solve(generate_top("small", 0), given.algorithm, 0.1)
     print(f"{given.algorithm}, {given.seconds} s, time limit x {given.cut}")

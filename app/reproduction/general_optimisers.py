@@ -1,4 +1,4 @@
-"""General optimisers of vehicle routes, given our problems as well as their models allow; for the benchmarks.
+"""General optimisers of vehicle routes, given our problems as well as their models allow; to compare with.
 
 Both are told of every UAV's position, range, speed, loads and step limit, of service times and deadlines, and
 maximise prizes less distance. Both lack deliveries paid by the fraction met: an area is served in one visit
@@ -15,7 +15,6 @@ They are extras: ``pip install -e ".[compare]"``.
 from __future__ import annotations
 
 import math
-import sys
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -23,7 +22,8 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import ProblemArrays, compile_problem
+from app.reproduction.errors import MissingPackage
+from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 
 _RESOLUTION = 1e5
 """Units of distance and of time that the problem's extent has; both optimisers count in integers."""
@@ -32,9 +32,15 @@ _UNLIMITED = 2**40
 
 
 def require(package: str) -> None:
-    """End with a line that says how to install a package, if it is missing."""
+    """Refuse to go on without a package.
+
+    Raises
+    ------
+    MissingPackage
+        If it is not installed.
+    """
     if find_spec(package) is None:
-        sys.exit(f'{package} is not installed: .venv/bin/pip install -e ".[compare]"')
+        raise MissingPackage(f'{package} is not installed: .venv/bin/pip install -e ".[compare]"')
 
 
 class _Model(NamedTuple):
@@ -60,15 +66,15 @@ class _Model(NamedTuple):
 
     clients: list[int]
     like: list[int]
-    distance: dict[int, np.ndarray]
-    duration: dict[int, np.ndarray]
-    charged: dict[int, np.ndarray]
-    longest: np.ndarray
-    service: np.ndarray
-    latest: np.ndarray
-    prize: np.ndarray
-    load: np.ndarray
-    need: np.ndarray
+    distance: dict[int, Floats]
+    duration: dict[int, Floats]
+    charged: dict[int, Floats]
+    longest: Floats
+    service: Floats
+    latest: Floats
+    prize: Floats
+    load: Floats
+    need: Floats
 
 
 def _model(problem: Problem, arrays: ProblemArrays) -> _Model:
@@ -77,7 +83,8 @@ def _model(problem: Problem, arrays: ProblemArrays) -> _Model:
     speed = float(arrays.speed.mean())
     per_time = per_distance * speed
     amounts = 1000 if max(arrays.load.max(), arrays.need.max()) < 1e6 else 1
-    like, seen = [], {}
+    like: list[int] = []
+    seen: dict[Any, int] = {}
     for i, uav in enumerate(problem.uavs):
         key = (uav.x_c, uav.y_c, uav.x_s, uav.y_s, uav.speed, uav.voyage - uav.dis, uav.loadlist, uav.ret)
         like.append(seen.setdefault(key, i))
@@ -198,7 +205,7 @@ def _clients(route: Any) -> list[int]:
     return [each.idx for each in route if each.is_client()]
 
 
-def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:
+def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: ARG001 - it draws nothing
     """Return the plan of OR-Tools routing: guided local search, disjunctions with penalties."""
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # noqa: PLC0415 - an extra
 
@@ -221,7 +228,7 @@ def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:
     chosen = np.ix_(nodes, nodes)
     weight = float(arrays.weight[0])
 
-    def registered(matrix: np.ndarray) -> int:
+    def registered(matrix: Floats) -> int:
         return int(model_.RegisterTransitMatrix(np.rint(matrix).astype(np.int64).tolist()))
 
     known: dict[tuple[str, int], int] = {}
