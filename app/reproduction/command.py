@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from app.reproduction.figures import require_matplotlib
 from app.reproduction.grid import runs_of
 from app.reproduction.report import write_report
 from app.reproduction.runner import do_runs
@@ -72,7 +73,13 @@ def reproduce(scale: Scale, out: Path, workers: int, for_minutes: float | None, 
     -------
     bool
         Whether all runs are done; tables and figures are only written then.
+
+    Raises
+    ------
+    MissingPackage
+        If matplotlib is not installed.
     """
+    require_matplotlib()
     runs = runs_of(scale)
     until = None if for_minutes is None else time.monotonic() + _SECONDS_A_MINUTE * for_minutes
     finished = 0

@@ -1,10 +1,79 @@
-"""Writes tables and figures."""
+"""Tables and figures from records: what only depends on seeds apart from what depends on time."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
-from app.reproduction.grid import Run
-from app.reproduction.scale import Scale
+from app.reproduction.claims import claims_table
+from app.reproduction.figures import write_figures
+from app.reproduction.grid import FAMILY, FIRST_SEED, PROBLEM_SEED, Run
+from app.reproduction.records import RecordStore
+from app.reproduction.results import Results
+from app.reproduction.scale import QUICK, Scale
+from app.reproduction.tables import tables
+
+_OPTIONS = (
+    "problems",
+    "seeds",
+    "learning_problems",
+    "learning_seeds",
+    "epochs",
+    "grid_epochs",
+    "service_epochs",
+    "timed_problems",
+)
 
 
-def write_report(scale: Scale, runs: list[Run], out: Path) -> None:
-    """Write everything."""
+def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
+    """Write ``tables/`` and ``figures/``, and ``timed/`` for what differs from run to run.
+
+    Parameters
+    ----------
+    scale, runs
+        What was run, all of it finished.
+    out
+        Folder of the records, and for the report.
+    """
+    results = Results(runs, RecordStore(out))
+    provenance = describe(scale, results)
+    for table in (*tables(results), claims_table(results)):
+        table.write(out / ("timed" if table.timed else "") / "tables", provenance)
+    write_figures(results, out / "figures", out / "timed" / "figures", provenance)
+
+
+def describe(scale: Scale, results: Results) -> str:
+    """Say in one line where figures come from: command, commit, seeds, machine and versions."""
+    where = "; ".join(
+        f"commit {commit}, {machine}, {versions}" for commit, machine, versions in sorted(results.sources)
+    )
+    return (
+        f"Made by `{command_line(scale)}`: problems of the family {FAMILY}, "
+        f"seeds [{PROBLEM_SEED}, M, N, number] with numbers from 0; "
+        f"solvers' seeds from {FIRST_SEED}; {where}."
+    )
+
+
+def command_line(scale: Scale) -> str:
+    """Return the command that runs a scale."""
+    words = ["python -m app reproduce"]
+    start = min((Scale(), QUICK), key=lambda each: _differences(scale, each))
+    if start == QUICK:
+        words.append("--quick")
+    for name in _OPTIONS:
+        if getattr(scale, name) != getattr(start, name):
+            words.append(f"--{name.replace('_', '-')} {getattr(scale, name)}")
+    if scale.cells != start.cells:
+        words.append(f"--cells '{' '.join(map(str, scale.cells))}'")
+    known = {*_OPTIONS, "cells"}
+    words += [
+        f"[{each.name} {getattr(scale, each.name)}]"
+        for each in fields(Scale)
+        if each.name not in known and getattr(scale, each.name) != getattr(start, each.name)
+    ]
+    return " ".join(words)
+
+
+def _differences(scale: Scale, start: Scale) -> int:
+    return sum(getattr(scale, each.name) != getattr(start, each.name) for each in fields(Scale))

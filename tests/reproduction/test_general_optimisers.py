@@ -1,0 +1,34 @@
+"""PyVRP and OR-Tools against brute force, on problems that they can express."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from brute_force import best_reward
+from referee import replay
+
+from app.domain.records import problem_to_record
+from app.reproduction.general_optimisers import pyvrp_plan, routing_plan
+from app.simulation.generator import FAMILIES, generate
+
+OPTIMISERS = {"PyVRP": pyvrp_plan, "OR-Tools": routing_plan}
+
+
+@pytest.mark.parametrize("name", OPTIMISERS)
+def test_where_every_area_is_served_in_full_the_best_plan_is_found(name):
+    for seed in range(4):
+        problem = generate("uniform", 2, 3, 1, np.random.default_rng([5, seed]))
+        targets = tuple(replace(t, loadlist=(1.0,)) for t in problem.targets)
+        uavs = tuple(replace(u, loadlist=(3.0,)) for u in problem.uavs)
+        problem = replace(problem, targets=targets, uavs=uavs, max_steps=2)
+        record = problem_to_record(problem)
+        plan = OPTIMISERS[name](problem, 0.2, 1)
+        assert replay(record, plan.assignment)["reward"] == pytest.approx(best_reward(record), abs=1e-4)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("name", OPTIMISERS)
+def test_plans_of_every_family_can_be_flown(name, family):
+    problem = generate(family, 4, 8, 2, np.random.default_rng([6, 4, 8]))
+    plan = OPTIMISERS[name](problem, 0.05, 1)
+    assert replay(problem_to_record(problem), plan.assignment)["reward"] >= 0
