@@ -42,6 +42,17 @@ def known(tmp_path):
     return read
 
 
+def test_experiments_that_are_not_done_go_on_with_the_same_command(tmp_path):
+    words = ["reproduce", "--quick", "--cells", "2x5", "--out", str(tmp_path), "--for-minutes", "0"]
+    begun = CliRunner().invoke(application, words)
+    assert begun.exit_code == 3
+    assert "the same command goes on" in begun.stderr
+    assert not (tmp_path / "tables").exists()
+    refused = CliRunner().invoke(application, [*words, "--cells", "9x9"])
+    assert refused.exit_code == 1
+    assert "'9x9' is no size of the grid" in refused.stderr
+
+
 def test_a_key_is_made_shown_once_listed_and_revoked(invoke, known):
     made = invoke("keys", "create", "--role", "library", "--name", "trainer\u00e9")
     token = made.stdout.strip()

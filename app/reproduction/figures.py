@@ -163,7 +163,7 @@ def _curves(results: Results, cell: Cell, methods: Sequence[str], levels: Sequen
 
 def _legend(figure: Any, parts: Sequence[Any]) -> None:
     """Put one legend below the axes, every label once."""
-    labelled = {}
+    labelled: dict[str, Any] = {}
     for axes in parts:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             labelled.setdefault(label, handle)

@@ -88,7 +88,7 @@ def runs_of(scale: Scale) -> list[Run]:
         for cell in scale.cells:
             if cell in method.cells:
                 found += _runs(scale, method, cell)
-    return sorted(found, key=_work, reverse=True)
+    return sorted(found, key=lambda run: (-_work(run), run.problem, run.seed))
 
 
 def _runs(scale: Scale, method: Method, cell: Cell) -> list[Run]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -13,6 +14,9 @@ from app.reproduction.records import RecordStore
 from app.reproduction.results import Results
 from app.reproduction.scale import QUICK, Scale
 from app.reproduction.tables import tables
+
+SUMS = "SHA256SUMS"
+"""Name of the file of checksums."""
 
 _OPTIONS = (
     "problems",
@@ -29,6 +33,8 @@ _OPTIONS = (
 def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
     """Write ``tables/`` and ``figures/``, and ``timed/`` for what differs from run to run.
 
+    ``SHA256SUMS`` is of all tables and figures that do not: a second run is compared by it.
+
     Parameters
     ----------
     scale, runs
@@ -41,6 +47,16 @@ def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
     for table in (*tables(results), claims_table(results)):
         table.write(out / ("timed" if table.timed else "") / "tables", provenance)
     write_figures(results, out / "figures", out / "timed" / "figures", provenance)
+    (out / SUMS).write_text(sums_of(out), encoding="utf-8")
+
+
+def sums_of(folder: Path) -> str:
+    """Return the SHA-256 of every table and figure that only depends on seeds, as ``sha256sum`` writes it."""
+    files = sorted(file for part in ("figures", "tables") for file in (folder / part).iterdir())
+    lines = [
+        f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.relative_to(folder)}\n" for file in files
+    ]
+    return "".join(lines)
 
 
 def describe(scale: Scale, results: Results) -> str:
