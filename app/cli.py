@@ -252,6 +252,8 @@ def reproduce(
     }
     with _refusals():
         scale = command.scale_of(quick, {k: v for k, v in given.items() if v is not None}, cells)
+        for package in command.missing_packages():
+            typer.echo(f"{package} is not installed, so it is not compared with (extra: compare)", err=True)
         with _bar("runs", total=float(command.count_runs(scale))) as advance:
             complete = command.reproduce(scale, out, workers, for_minutes, advance)
     if not complete:

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from app.reproduction.figures import require_matplotlib
-from app.reproduction.grid import runs_of
+from app.reproduction.grid import missing_packages, runs_of
 from app.reproduction.report import write_report
 from app.reproduction.runner import do_runs
 from app.reproduction.scale import QUICK, Cell, Scale
+
+__all__ = ["count_runs", "missing_packages", "reproduce", "scale_of"]
 
 Advance = Callable[[float, str], None]
 """Takes how many runs are done, and a word about the last."""
