@@ -83,10 +83,10 @@ def test_a_claim_holds_where_it_holds_at_every_size(tmp_path, qmix, verdict):
     rewards = {(cell, "ga", 0, 123): 1.0 for cell in SHOWN}
     rewards |= {(cell, "qmix-paper", 0, 123): reward for cell, reward in zip(SHOWN, qmix, strict=True)}
     found = claims(results_of(tmp_path, rewards))
-    assert found[0].text == "QMIX's reward is far above the GA's"
+    assert found[0].text == "QMIX's reward is above the GA's"
     assert found[0].holds == verdict
     assert f"5x10: {qmix[0]:.2f}" in found[0].measured
-    assert found[1].holds == "not measured"
+    assert next(c for c in found if c.text.startswith("Transfer's reward")).holds == "not measured"
 
 
 def test_when_a_curve_has_converged(tmp_path):
