@@ -234,8 +234,8 @@ def reproduce(
 ) -> None:
     """Repeat the paper's experiments, and write tables and figures.
 
-    The full protocol, ten problems a size and five seeds a problem with 50,000 epochs each, takes hundreds of
-    core hours; the options say less. A run that was interrupted goes on where it stopped.
+    The full protocol, ten problems a size and five seeds a problem with 50,000 epochs each, takes more than a
+    hundred core hours; the options say less. A run that was interrupted goes on where it stopped.
     """
     # Loads compiled code, which the other commands need not wait for.
     from app.reproduction import command  # noqa: PLC0415 - slow to load

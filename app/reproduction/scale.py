@@ -44,7 +44,7 @@ SHOWN = (Cell(5, 10), Cell(10, 10), Cell(10, 5))
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How much is run. The defaults are the full protocol, which takes hundreds of core hours.
+    """How much is run. The defaults are the full protocol, which takes more than a hundred core hours.
 
     Attributes
     ----------
