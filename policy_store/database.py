@@ -7,9 +7,10 @@ an exception leaves it. What must be atomic together is done over one connection
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from alembic import command
 from alembic.config import Config
@@ -62,6 +63,8 @@ class Database:
     ----------
     url
         ``sqlite:///relative/path`` or ``sqlite:////absolute/path``. A missing folder is made.
+    write_json, read_json
+        How columns of JSON are written and read; default: as the standard library does it.
 
     Attributes
     ----------
@@ -77,14 +80,19 @@ class Database:
         If the URL is none, or names a database that is not SQLite in a file.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(
+        self,
+        url: str,
+        write_json: Callable[[Any], str] | None = None,
+        read_json: Callable[[str], Any] | None = None,
+    ) -> None:
         try:
             parsed = make_url(url)
         except ArgumentError as error:
             raise UnsupportedDatabase(url, "it is not a database URL") from error
         if parsed.drivername not in ("sqlite", "sqlite+pysqlite"):
             raise UnsupportedDatabase(str(parsed), f"{parsed.drivername} is not supported, only sqlite")
-        engines = open_sqlite(parsed)
+        engines = open_sqlite(parsed, write_json, read_json)
         self.url = url
         self.write_engine: Engine = engines.write
         self.read_engine: Engine = engines.read

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,17 @@ class Engines:
     lock_name: str
 
 
-def open_sqlite(url: URL) -> Engines:
+def open_sqlite(
+    url: URL, write_json: Callable[[Any], str] | None, read_json: Callable[[str], Any] | None
+) -> Engines:
     """Make the engines of an SQLite file; its folder is made where it is missing.
+
+    Parameters
+    ----------
+    url
+        Of the file.
+    write_json, read_json
+        For columns of JSON; None: as the standard library does it.
 
     Raises
     ------
@@ -52,9 +62,12 @@ def open_sqlite(url: URL) -> Engines:
     path = Path(name).resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     resolved = url.set(database=str(path))
+    json: dict[str, Any] = {"json_serializer": write_json, "json_deserializer": read_json}
     return Engines(
-        write=_engine(resolved, "BEGIN IMMEDIATE", poolclass=QueuePool, pool_size=1, max_overflow=0),
-        read=_engine(resolved, "BEGIN", query_only=True, poolclass=QueuePool, pool_size=8, max_overflow=32),
+        write=_engine(resolved, "BEGIN IMMEDIATE", poolclass=QueuePool, pool_size=1, max_overflow=0, **json),
+        read=_engine(
+            resolved, "BEGIN", query_only=True, poolclass=QueuePool, pool_size=8, max_overflow=32, **json
+        ),
         # Alembic rebuilds a table to change it; with foreign keys on, dropping the old one would delete the
         # rows that refer to it. The pragma cannot be changed inside a transaction, hence an own engine.
         migrate=_engine(

@@ -195,7 +195,21 @@ def _violations(problem: Problem) -> Iterator[Violation]:
 
 def _uav_violations(problem: Problem, materials: int | None) -> Iterator[Violation]:
     seen: dict[str, int] = {}
+    x_limit, y_limit = _limits(problem.crs)
     for i, uav in enumerate(problem.uavs):
+        # A problem of thousands is sound nearly always: what is wrong is looked for where anything is.
+        if (
+            -x_limit <= uav.x_s <= x_limit
+            and -y_limit <= uav.y_s <= y_limit
+            and -x_limit <= uav.x_c <= x_limit
+            and -y_limit <= uav.y_c <= y_limit
+            and MIN_SPEED <= uav.speed <= MAX_MAGNITUDE
+            and 0.0 <= uav.voyage <= MAX_MAGNITUDE
+            and 0.0 <= uav.dis <= MAX_MAGNITUDE
+            and _are_amounts(uav.loadlist, materials)
+            and _is_new(uav.id, seen, i)
+        ):
+            continue
         at = f"/uavs/{i}"
         yield from _identifier(at, uav.id, seen, i)
         yield from _position(at, problem.crs, uav.x_s, uav.y_s, "x_s", "y_s")
@@ -208,7 +222,18 @@ def _uav_violations(problem: Problem, materials: int | None) -> Iterator[Violati
 
 def _target_violations(problem: Problem, materials: int | None) -> Iterator[Violation]:
     seen: dict[str, int] = {}
+    x_limit, y_limit = _limits(problem.crs)
     for j, target in enumerate(problem.targets):
+        if (
+            -x_limit <= target.x <= x_limit
+            and -y_limit <= target.y <= y_limit
+            and 0.0 <= target.level <= MAX_MAGNITUDE
+            and (target.deadline is None or -MAX_MAGNITUDE <= target.deadline <= MAX_MAGNITUDE)
+            and 0.0 <= target.service_time <= MAX_MAGNITUDE
+            and _are_amounts(target.loadlist, materials)
+            and _is_new(target.id, seen, j)
+        ):
+            continue
         at = f"/targets/{j}"
         yield from _identifier(at, target.id, seen, j)
         yield from _position(at, problem.crs, target.x, target.y, "x", "y")
@@ -229,9 +254,32 @@ def _number(
 
 
 def _position(at: str, crs: str, x: float, y: float, x_name: str, y_name: str) -> Iterator[Violation]:
-    x_limit, y_limit = (180.0, 90.0) if crs == "wgs84" else (MAX_MAGNITUDE, MAX_MAGNITUDE)
+    x_limit, y_limit = _limits(crs)
     yield from _number(f"{at}/{x_name}", x, -x_limit, x_limit)
     yield from _number(f"{at}/{y_name}", y, -y_limit, y_limit)
+
+
+def _limits(crs: str) -> tuple[float, float]:
+    return (180.0, 90.0) if crs == "wgs84" else (MAX_MAGNITUDE, MAX_MAGNITUDE)
+
+
+def _are_amounts(amounts: tuple[float, ...], materials: int | None) -> bool:
+    """Whether :func:`_amounts` has nothing to say; the sum finds what is not a number in any place."""
+    return bool(
+        amounts
+        and (materials is None or len(amounts) == materials)
+        and min(amounts) >= 0.0
+        and max(amounts) <= MAX_MAGNITUDE
+        and math.isfinite(sum(amounts))
+    )
+
+
+def _is_new(identifier: str, seen: dict[str, int], index: int) -> bool:
+    """Whether :func:`_identifier` has nothing to say; the id is known from then on."""
+    sound = 1 <= len(identifier) <= MAX_ID_LENGTH and identifier.isprintable() and identifier not in seen
+    if sound:
+        seen[identifier] = index
+    return sound
 
 
 def _amounts(pointer: str, amounts: tuple[float, ...], materials: int | None) -> Iterator[Violation]:

@@ -5,20 +5,35 @@ A record is complete: every default has been filled in, so that it means the sam
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
+from operator import attrgetter
 from typing import Any
 
 from app.domain.problem import UAV, Objective, Problem, Target
 
+_UAV = tuple(field.name for field in fields(UAV))
+_TARGET = tuple(field.name for field in fields(Target))
+_PLAIN = (float, int, str, bool)
+_uav_values, _target_values = attrgetter(*_UAV), attrgetter(*_TARGET)
+
 
 def problem_to_record(problem: Problem) -> dict[str, Any]:
     """Turn a problem into a record, with the field names of the specification."""
-    record: dict[str, Any] = to_record(problem)
-    for uav in record["uavs"]:
-        uav["ret"] = int(uav["ret"])
-    return record
+    return {
+        "uavs": [
+            dict(zip(_UAV, _uav_values(uav), strict=True), ret=int(uav.ret), loadlist=list(uav.loadlist))
+            for uav in problem.uavs
+        ],
+        "targets": [
+            dict(zip(_TARGET, _target_values(target), strict=True), loadlist=list(target.loadlist))
+            for target in problem.targets
+        ],
+        "max_steps": problem.max_steps,
+        "crs": problem.crs,
+        "objective": to_record(problem.objective),
+    }
 
 
 def to_record(value: Any) -> Any:
@@ -33,13 +48,21 @@ def to_record(value: Any) -> Any:
         flat = not value or isinstance(value[0], float | int | str)
         return list(value) if flat else [to_record(each) for each in value]
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: to_record(getattr(value, name)) for name in _names(type(value))}
+        names, values_of = _fields(type(value))
+        return {
+            name: each if each is None or type(each) in _PLAIN else to_record(each)
+            for name, each in zip(names, values_of(value), strict=True)
+        }
     return value
 
 
 @cache
-def _names(of: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(of))
+def _fields(of: type) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
+    """Return the names of a dataclass's fields, and what gets all their values at once."""
+    names = tuple(field.name for field in fields(of))
+    if len(names) == 1:
+        return names, lambda value: (getattr(value, names[0]),)
+    return names, attrgetter(*names)
 
 
 def problem_from_record(record: Mapping[str, Any]) -> Problem:

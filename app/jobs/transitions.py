@@ -76,17 +76,19 @@ def change(
     connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
 ) -> Job:
     """Move a job on from the state, and the attempt, in which it was read."""
-    changed = (
+    stored = {"status": status, "progress": progress.as_json(), **values}
+    left = (
         connection.execute(
             sa.update(jobs)
             .where(jobs.c.id == row["id"], jobs.c.attempt == row["attempt"], jobs.c.status == row["status"])
-            .values(status=status, progress=progress.as_json(), **values)
-            .returning(jobs, has_artifact)
+            .values(stored)
+            # Not all of it: payload and result are known here, and may be large.
+            .returning(has_artifact)
         )
         .mappings()
         .one()
     )
-    return job_of(changed)
+    return job_of({**row, **stored, **left})
 
 
 def progress_of(row: RowMapping | dict[str, Any]) -> Progress:
