@@ -6,6 +6,7 @@ so what comes out is the reward of a legal plan, whatever the additional visit d
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -52,10 +53,18 @@ class Counterfactuals:
         Whether unloading is planned.
     remaining
         (N,) what each target needs after the plan, over all materials.
+    hurry
+        When true, no more are evaluated.
     """
 
     def __init__(
-        self, arrays: ProblemArrays, target: Integers, length: Integers, planned: bool, remaining: Floats
+        self,
+        arrays: ProblemArrays,
+        target: Integers,
+        length: Integers,
+        planned: bool,
+        remaining: Floats,
+        hurry: Callable[[], bool],
     ) -> None:
         # Copies of what a counterfactual may relax, with one step more than there is.
         self._arrays = arrays._replace(
@@ -73,11 +82,12 @@ class Counterfactuals:
         self._cursor = np.empty(m, np.int64)
         cost = int(length.sum()) + m + n
         self._left = _WORK // (cost * (_PLANNED_COST if planned else 1))
+        self._hurry = hurry
 
     @property
     def spent(self) -> bool:
         """Whether no further counterfactual should be evaluated."""
-        return self._left <= 0
+        return self._left <= 0 or self._hurry()
 
     def insert(
         self,

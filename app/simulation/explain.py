@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from app.domain.allocation import Allocation, Route, Stop
@@ -40,10 +42,18 @@ def reward_of(problem: Problem, plan: Plan) -> float:
     return float(result.reward[0])
 
 
-def explain(problem: Problem, plan: Plan) -> Allocation:
+def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: False) -> Allocation:
     """Replay a plan and write down everything that follows from it.
 
     With planned unloading the deliveries are the best ones for the plan's routes.
+
+    Parameters
+    ----------
+    problem, plan
+        The problem and a legal plan of it.
+    hurry
+        Asked every few milliseconds; once it is true, reasons for unmet needs are found out no further than
+        is quick. What the plan does is always complete.
 
     Raises
     ------
@@ -82,7 +92,7 @@ def explain(problem: Problem, plan: Plan) -> Allocation:
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
-        unmet=unmet_targets(problem, arrays, episodes, actions, delivered, float(result.reward[0])),
+        unmet=unmet_targets(problem, arrays, episodes, actions, delivered, float(result.reward[0]), hurry),
     )
 
 

@@ -8,6 +8,7 @@ are first; where an answer has too many for all to be flown, the rest say that t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -30,6 +31,9 @@ NOT_CHOSEN = "not_chosen"
 
 _LOOKS = 3_000_000
 """Places for one more visit that are looked at: tens of milliseconds. Beyond, only ends of routes."""
+
+_PIECE = 300_000
+"""Of them, between two looks at the clock."""
 
 
 class _Facts(NamedTuple):
@@ -86,6 +90,7 @@ def unmet_targets(
     actions: Integers,
     delivered: Floats,
     reward: float,
+    hurry: Callable[[], bool],
 ) -> tuple[Unmet, ...]:
     """List the targets with needs left at the end of a plan.
 
@@ -99,6 +104,8 @@ def unmet_targets(
         (S', M) joint actions and (S', M, K) what they unload.
     reward
         What the plan earns.
+    hurry
+        Once it is true, only ends of routes are looked at, and nothing more is flown.
     """
     m, n, _ = arrays.shape
     visiting = actions < n
@@ -112,9 +119,9 @@ def unmet_targets(
         return ()
     share = remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
     urgent = open_targets[np.argsort(-arrays.level[0, open_targets] * share, kind="stable")]
-    facts = _gather(arrays, plan, urgent)
+    facts = _gather(arrays, plan, urgent, hurry)
     planned = problem.objective.unloading == "planned"
-    counterfactuals = Counterfactuals(arrays, target, length, planned, remaining.sum(axis=1))
+    counterfactuals = Counterfactuals(arrays, target, length, planned, remaining.sum(axis=1), hurry)
     judge = _Judge(problem, arrays, plan, facts, counterfactuals)
     found = {int(j): judge.reason(int(j)) for j in urgent}
     return tuple(found[int(j)] for j in open_targets)
@@ -258,24 +265,31 @@ class _Judge:
         return " and ".join(f"{left[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0))
 
 
-def _gather(arrays: ProblemArrays, plan: _Plan, urgent: Integers) -> _Facts:
+def _gather(arrays: ProblemArrays, plan: _Plan, urgent: Integers, hurry: Callable[[], bool]) -> _Facts:
     """Look at the swarm and the plan from every target that is listed, most urgent first."""
     m, n, _ = arrays.shape
     facts = _Facts(
         np.full(n, -1, np.int64), np.full(n, np.inf), np.full(n, -1, np.int64), np.full(n, np.inf),
         np.full(n, -1, np.int64), np.zeros(n, np.int64), np.full(n, -np.inf), np.zeros(n),
     )  # fmt: skip
-    _look_from_start(arrays, plan.episodes, urgent, facts)
+    # What is found does not depend on the order; neighbours in memory are quicker one after the other.
+    _look_from_start(arrays, plan.episodes, np.sort(urgent), facts)
     steps = plan.target.shape[1]
     # Just before each visit: distance flown, time, what is carried; and what is earned from there on.
     flown, clock = np.zeros((m, steps + 1)), np.zeros((m, steps + 1))
     load, later = np.zeros((m, steps + 1, arrays.shape[2])), np.zeros((m, steps + 1))
     _walk(arrays, plan.target, plan.length, plan.delivered, flown, clock, load, later)
     places = int(plan.length.sum()) + m
-    thorough = min(len(urgent), _LOOKS // max(places, 1))
-    _look_for_place(
-        arrays, plan.episodes, plan.target, plan.length, flown, clock, load, later, urgent, thorough, facts
-    )
+    thorough, piece = min(len(urgent), _LOOKS // places), max(1, _PIECE // places)
+    done = 0
+    while done < len(urgent):
+        everywhere = done < thorough and not hurry()
+        end = min(done + piece, thorough) if everywhere else len(urgent)
+        _look_for_place(
+            arrays, plan.episodes, plan.target, plan.length, flown, clock, load, later,
+            np.sort(urgent[done:end]), everywhere, facts,
+        )  # fmt: skip
+        done = end
     return facts
 
 
@@ -284,13 +298,15 @@ def _look_from_start(
     arrays: ProblemArrays, episodes: simulator.Episodes, urgent: Integers, facts: _Facts
 ) -> None:
     """Who carries what a target needs, who of them has the range, and who of those is there first."""
-    for q in range(urgent.shape[0]):
-        j = urgent[q]
-        for i in range(arrays.speed.shape[1]):
+    for i in range(arrays.speed.shape[1]):
+        if arrays.ret[0, i]:
+            continue
+        for q in range(urgent.shape[0]):
+            j = urgent[q]
             useful = False
             for k in range(arrays.load.shape[2]):
                 useful = useful or (arrays.load[0, i, k] > 0.0 and episodes.need[0, j, k] > 0.0)
-            if arrays.ret[0, i] or not useful:
+            if not useful:
                 continue
             reach = arrays.dis[0, i] + arrays.start_target[0, i, j]
             if arrays.return_to_base[0]:
@@ -347,17 +363,17 @@ def _look_for_place(
     load: Floats,
     later: Floats,
     urgent: Integers,
-    thorough: int,
+    everywhere: bool,
     facts: _Facts,
 ) -> None:
-    """Guess the best place for one more visit to each target; all places for the first `thorough` ones."""
+    """Guess the best place for one more visit to each target: among all, or the ends of routes."""
     for i in range(target.shape[0]):
         if arrays.ret[0, i]:
             continue
         end = length[i]
         for q in range(urgent.shape[0]):
             j = urgent[q]
-            for place in range(0 if q < thorough else end, end + 1):
+            for place in range(0 if everywhere else end, end + 1):
                 if place == 0:
                     there = arrays.start_target[0, i, j]
                 else:
