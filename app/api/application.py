@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -12,6 +13,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
 
 import app
+from app.api import stored_json
 from app.api.access.guard import Guard
 from app.api.access.keys import KeyStore
 from app.api.dashboard import install_dashboard
@@ -42,7 +44,7 @@ _READ_HEADERS = (
     "X-Request-ID",
 )
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
-_WARM_UP = "app.jobs.work:warm_up"
+_WARM_UP, _WARM_UP_RESERVE = "app.jobs.work:warm_up", "app.jobs.work:warm_up_at_once"
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
 
@@ -60,7 +62,7 @@ def create_application(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(application: FastAPI) -> AsyncIterator[None]:
         limits = ContainerLimits(bytes=settings.max_checkpoint_bytes)
-        database = Database(settings.resolved_database_url)
+        database = Database(settings.resolved_database_url, stored_json.write, stored_json.read)
         try:
             store = PolicyLibrary(database, limits)
             store.migrate()
@@ -72,6 +74,7 @@ def create_application(settings: Settings) -> FastAPI:
                 database,
                 job_kinds(store, limits),
                 LocalExecutor(settings.workers, warm_up=_WARM_UP, log_level=settings.log_level),
+                reserve=LocalExecutor(1, warm_up=_WARM_UP_RESERVE, log_level=settings.log_level),
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
@@ -80,6 +83,9 @@ def create_application(settings: Settings) -> FastAPI:
             )
             metrics.watch(service.load, store.count, database.size)
             await service.start()
+            # What is there now stays: to look through it for garbage would only hold up requests.
+            gc.collect()
+            gc.freeze()
             application.state.services = Services(settings, database, store, service, keys, metrics)
             try:
                 yield

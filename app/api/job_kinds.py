@@ -37,7 +37,7 @@ def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
         return {**work.result, "policy_id": policy.id}
 
     return [
-        JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive"),
+        JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive", at_once="app.jobs.work:allocate_at_once"),
         JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library),
         # The weights are the job's artifact, and the policy's.
         JobKind(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from email.message import Message as Header
@@ -37,6 +38,8 @@ class JsonRoute(APIRoute):
                 body = await request.body()
             except ClientDisconnect:
                 raise HTTPException(400, "the client has gone before the body was complete") from None
+            # A time limit begins here: how long the client took to send is not in the service's hands.
+            request.state.arrived_s = time.monotonic()
             if body:
                 _require_json(request.headers.get("content-type", ""))
                 await request.json()

@@ -1,45 +1,64 @@
-"""How long an answer takes once its plan is found: what a time limit must keep back from the search.
+"""How long an answer takes beside the search: what a time limit must keep back, and whether to search at all.
 
 It depends on the problem's size, on the machine, and on how busy that is; so it is measured with every answer
-that this process writes down, beginning with its warm-up, and never guessed.
+of this process, beginning with its warm-up, and never guessed.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 from app.domain.problem import Problem
 
-_FIXED_S = 0.015
-"""Back to the service, onto the disk and out: what a small answer takes beside its explanation."""
+_FIXED_S = 0.012
+"""Back to the service, onto the disk and out: what a small answer takes beside its being written down."""
 
-_WHOLE_ANSWER = 2.5
-"""Time of a large answer from plan to socket, in times of its explanation: stored and sent as JSON, it is
-read and written four times. An estimate, not measured as a whole."""
+_WHOLE_WAY = 5.0
+"""Time of a large answer from its last word to the client's socket, in times of its being written down once:
+it goes through a pipe, is stored, and is written and checked once more. Measured at 1000 x 2000."""
 
-_LARGEST_SHARE = 0.25
-"""Of a short time limit the search keeps most, and the answer is late by what it takes."""
+_EXPLAINING_SHARE = 0.25
+"""Of a short time limit, at most, that is kept for reasons; what is not found out by then is left out."""
 
 _REMEMBERED = 16
+_FORGETTING = 0.8
 
 
 class AnswerTime:
-    """Expects of the next answer what the slowest of the last ones took, for its size."""
+    """Expects of the next answer what the slowest of the last ones took, for its size.
+
+    Of an algorithm it expects that it returns as late after its time as it lately did at most: that is what
+    it cannot interrupt, mostly its preparations.
+    """
 
     def __init__(self) -> None:
-        self._seconds_a_unit: deque[float] = deque(maxlen=_REMEMBERED)
+        self._explaining: deque[float] = deque(maxlen=_REMEMBERED)
+        self._writing: deque[float] = deque(maxlen=_REMEMBERED)
+        self._overrun: dict[tuple[str, int], float] = {}
 
-    def took(self, problem: Problem, seconds: float) -> None:
-        """Note how long it took to explain a plan of a problem."""
-        self._seconds_a_unit.append(seconds / _units(problem))
+    def explained(self, problem: Problem, seconds: float) -> None:
+        """Note how long it took to explain a plan of a problem, with all the reasons there are."""
+        self._explaining.append(seconds / _units(problem))
+
+    def wrote(self, problem: Problem, seconds: float) -> None:
+        """Note how long it took to write an answer down."""
+        self._writing.append(seconds / _units(problem))
+
+    def overran(self, algorithm: str, problem: Problem, seconds: float) -> None:
+        """Note how long after its time an algorithm returned."""
+        at = algorithm, _magnitude(problem)
+        self._overrun[at] = max(_FORGETTING * self._overrun.get(at, 0.0), seconds)
 
     def forget(self) -> None:
         """Begin anew: what was measured first had something to load."""
-        self._seconds_a_unit.clear()
+        self._explaining.clear()
+        self._writing.clear()
+        self._overrun.clear()
 
-    def expected(self, problem: Problem) -> float:
-        """Return the seconds from a plan to the client, for a problem of this size."""
-        return _FIXED_S + _WHOLE_ANSWER * max(self._seconds_a_unit, default=0.0) * _units(problem)
+    def way_back(self, problem: Problem) -> float:
+        """Return the seconds from an explained plan to the client."""
+        return _FIXED_S + _WHOLE_WAY * max(self._writing, default=0.0) * _units(problem)
 
     def kept_back(self, problem: Problem, left_s: float) -> float:
         """Return the seconds before the end of the time limit at which the search should stop.
@@ -51,7 +70,20 @@ class AnswerTime:
         left_s
             Seconds until the limit; negative where it has passed.
         """
-        return max(0.0, min(_LARGEST_SHARE * left_s, self.expected(problem)))
+        explaining = max(self._explaining, default=0.0) * _units(problem)
+        return self.way_back(problem) + max(0.0, min(_EXPLAINING_SHARE * left_s, explaining))
+
+    def is_too_short(self, algorithm: str, problem: Problem, left_s: float) -> bool:
+        """Say whether an algorithm would only prepare in the seconds that are left to it.
+
+        Each time it says so it expects a little less, so that one that was slow by accident is tried again.
+        """
+        at = algorithm, _magnitude(problem)
+        expected = self._overrun.get(at, 0.0)
+        if left_s > expected:
+            return False
+        self._overrun[at] = _FORGETTING * expected
+        return True
 
 
 def _units(problem: Problem) -> float:
@@ -60,5 +92,14 @@ def _units(problem: Problem) -> float:
     The sizes of small problems count for more than they are, so that one that was slow by accident does not
     make all large ones look slow.
     """
+    return max(300.0, _size(problem))
+
+
+def _magnitude(problem: Problem) -> int:
+    """Return the same for problems of which none is more than twice as large as another."""
+    return int(math.log2(_size(problem)))
+
+
+def _size(problem: Problem) -> float:
     visits = min(problem.n_uavs * problem.max_steps, 4 * problem.n_targets)
-    return max(300.0, visits + problem.n_targets + problem.n_uavs * problem.n_targets / 1000)
+    return visits + problem.n_targets + problem.n_uavs * problem.n_targets / 1000

@@ -5,15 +5,16 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from weakref import WeakValueDictionary
 
 from app.jobs.model import Job, JobEvent, Progress
 
 # A progress supersedes those before it: a listener that is further behind misses nothing that still holds.
-_REMEMBERED_EVENTS = 256
-_REMEMBERED_ENDS = 64
+# Each may have a plan in it, of a thousand UAVs too.
+_REMEMBERED_EVENTS = 32
 
 
 class Channel:
@@ -65,32 +66,30 @@ class Channel:
 
 
 class Channels:
-    """The channels of the jobs that go on, and of the last that ended."""
+    """The channels of the jobs that run, and of those that somebody listens to: kept by whoever has one.
+
+    Who comes after the end finds the job in the table, and nothing is held in memory for it.
+    """
 
     def __init__(self) -> None:
-        self._open: dict[str, Channel] = {}
-        self._ended: OrderedDict[str, Channel] = OrderedDict()
-
-    def find(self, job_id: str) -> Channel | None:
-        """Return a job's channel if it has one."""
-        return self._open.get(job_id) or self._ended.get(job_id)
+        self._known: WeakValueDictionary[str, Channel] = WeakValueDictionary()
 
     def open(self, job_id: str) -> Channel:
-        """Return a job's channel, a new one if it has none."""
-        return self.find(job_id) or self._open.setdefault(job_id, Channel())
+        """Return a job's channel, a new one if nobody has it."""
+        channel = self._known.get(job_id)
+        if channel is None:
+            channel = self._known[job_id] = Channel()
+        return channel
 
     def end(self, job: Job) -> None:
         """Tell a job's end to those who listen."""
-        channel = self.open(job.id)
-        channel.end(job)
-        self._open.pop(job.id, None)
-        self._ended[job.id] = channel
-        if len(self._ended) > _REMEMBERED_ENDS:
-            self._ended.popitem(last=False)
+        channel = self._known.get(job.id)
+        if channel is not None:
+            channel.end(job)
 
     def ring(self) -> None:
         """Wake everybody who waits on any channel, to look again."""
-        for channel in self._open.values():
+        for channel in list(self._known.values()):
             channel.ring()
 
 

@@ -17,14 +17,15 @@ from structlog.contextvars import bind_contextvars
 
 from app.jobs.channel import Channels
 from app.jobs.errors import Draining, UnknownJobKind
-from app.jobs.executor import Execution, Executor, Outcome, Raised, Returned
-from app.jobs.failure import INTERNAL_ERROR, describe, failure
+from app.jobs.executor import Execution, Executor
 from app.jobs.housekeeping import Housekeeping
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
+from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
 from app.jobs.observer import JobObserver
 from app.jobs.owner import is_alive
 from app.jobs.run import Run
+from app.jobs.settling import Settling
 from app.jobs.store import Claim, JobStore, QueueLimit
 from app.jobs.writer import Writer
 from app.logs import labels
@@ -45,7 +46,7 @@ class Dispatcher:
         The job table.
     owner
         In whose name the store takes jobs.
-    kinds, executor, max_queued, overrun_grace_s, retention_s, observer
+    kinds, executor, reserve, max_queued, overrun_grace_s, retention_s, observer
         As given to :class:`app.jobs.service.JobService`.
     channels
         Who listens to which job.
@@ -57,6 +58,7 @@ class Dispatcher:
         owner: str,
         kinds: Sequence[JobKind],
         executor: Executor,
+        reserve: Executor | None,
         channels: Channels,
         *,
         max_queued: int,
@@ -67,14 +69,17 @@ class Dispatcher:
         self._store = store
         self._owner = owner
         self._kinds = {kind.name: kind for kind in kinds}
-        self._executor = executor
+        self._executor, self._reserve = executor, reserve
         self._channels = channels
         self._max_queued = max_queued
         self._grace_s = overrun_grace_s
         self._observer = observer
         self._writer = Writer()
+        self._settling = Settling(store, self._writer, self._kinds, overrun_grace_s)
         self._lanes = Lanes(executor.capacity)
         self._runs: dict[str, Run] = {}
+        self._last_minute = LastMinute(self._answer_at_once)
+        self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
         self._house = Housekeeping(store, self._writer, self._runs.values, self._look_after, retention_s)
         self._housekeeping: asyncio.Task[None] | None = None
@@ -96,14 +101,18 @@ class Dispatcher:
             self._lanes.ran(lane, durations)
         self._accepting = True
         await self._executor.start(self._wake.set)
+        if self._reserve is not None:
+            await self._reserve.start(lambda: None)
         self._wake.set()
         self._dispatching = asyncio.create_task(self._dispatch())
         self._housekeeping = asyncio.create_task(self._house.keep())
+        self._watching = asyncio.create_task(self._last_minute.keep())
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
         self._accepting = False
         self._wake.set()
+        self._last_minute.end()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
         if self._requests:
             await asyncio.wait(self._requests)
@@ -116,10 +125,14 @@ class Dispatcher:
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
         self._ended.set()
+        if self._watching is not None:
+            await self._watching
         self._house.end()
         if self._housekeeping is not None:
             await self._housekeeping
         await self._executor.close()
+        if self._reserve is not None:
+            await self._reserve.close()
         await self._writer.close()
 
     async def admit(
@@ -162,6 +175,7 @@ class Dispatcher:
         except BaseException:
             if run_now:
                 self._give_back(lane)
+                self._wake.set()
             raise
         if created:
             _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
@@ -169,10 +183,11 @@ class Dispatcher:
         if created and run_now:
             self._begin(claim)
         elif created:
-            self._lanes.waiting[lane] += 1
+            self._waits(claim.job, claim.deadline)
             self._wake.set()
         elif run_now:
             self._give_back(lane)
+            self._wake.set()
         return claim.job, created
 
     async def cancel(self, job_id: str) -> Job:
@@ -184,7 +199,7 @@ class Dispatcher:
     async def _cancel(self, job_id: str) -> Job:
         job, before = await self._writer.write(self._store.cancel, job_id)
         if before is JobStatus.QUEUED:
-            self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
+            self._waits_no_more(job)
             self._tell_end(job, None)
         run = self._runs.get(job_id)
         if before is JobStatus.RUNNING and run is not None and run.execution is not None:
@@ -199,7 +214,7 @@ class Dispatcher:
             ready=self._executor.ready,
             running=dict(self._lanes.running),
             waiting=dict(self._lanes.waiting),
-            restarts=self._executor.restarts,
+            restarts=self._executor.restarts + (0 if self._reserve is None else self._reserve.restarts),
         )
 
     def runs(self, job_id: str) -> bool:
@@ -227,21 +242,49 @@ class Dispatcher:
                     _log.exception("no job could be taken from the queue; there will be another try")
                     await asyncio.sleep(_PAUSE_S)
                     continue
-                self._lanes.waiting[lane] = 0 if claim is None else max(0, self._lanes.waiting[lane] - 1)
                 if claim is None:
+                    self._lanes.waiting[lane] = 0
                     self._lanes.running[lane] -= 1
                 else:
+                    self._waits_no_more(claim.job)
                     self._begin(claim)
 
-    def _begin(self, claim: Claim) -> None:
+    def _waits(self, job: Job, deadline: float | None) -> None:
+        """Take note of one more job that waits."""
+        self._lanes.waiting[job.lane] += 1
+        self._watch(job.id, job.kind, deadline)
+
+    def _watch(self, job_id: str, kind: str, deadline: float | None) -> None:
+        known = self._kinds.get(kind)
+        if self._reserve is not None and deadline is not None and known is not None and known.at_once:
+            self._last_minute.watch(job_id, deadline)
+
+    def _waits_no_more(self, job: Job) -> None:
+        self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
+        self._last_minute.forget(job.id)
+
+    async def _answer_at_once(self, job_id: str) -> bool:
+        """Answer a job that waits and whose time is up, beside the workers; False if it does not wait."""
+        claim = await self._writer.write(self._store.claim_this, job_id)
+        if claim is None:
+            return False
+        self._waits_no_more(claim.job)
+        await asyncio.wait([self._begin(claim, at_once=True)])
+        return True
+
+    def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.
 
         So a cancellation, which is committed after it, finds it in ``_runs``.
         """
         job = claim.job
-        run = Run(job, claim.deadline, job.progress, saved_at=time.monotonic())
-        self._runs[job.id] = run
+        kind = self._kinds[job.kind]
+        executor, work = self._executor, kind.work
+        if at_once and self._reserve is not None and kind.at_once is not None:
+            executor, work = self._reserve, kind.at_once
         channel = self._channels.open(job.id)
+        run = Run(job, claim.deadline, channel, job.progress, saved_at=time.monotonic(), at_once=at_once)
+        self._runs[job.id] = run
 
         def on_progress(progress: Progress) -> None:
             run.progress, run.unsaved = progress, True
@@ -250,8 +293,8 @@ class Dispatcher:
         if job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
         left = None if claim.deadline is None else claim.deadline - time.time()
-        run.execution = self._executor.submit(
-            self._kinds[job.kind].work,
+        run.execution = executor.submit(
+            work,
             job.payload,
             time_left_s=left,
             on_progress=on_progress,
@@ -260,7 +303,7 @@ class Dispatcher:
         if left is not None:
             loop = asyncio.get_running_loop()
             run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
-        _spawn(self._finish(run, run.execution), self._finishing)
+        return _spawn(self._finish(run, run.execution), self._finishing)
 
     async def _finish(self, run: Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
@@ -272,56 +315,23 @@ class Dispatcher:
             took = time.monotonic() - begun
             for timer in run.timers:
                 timer.cancel()
-            job = await self._settle(run, outcome)
+            job = await self._settling.settle(run, outcome)
         except Exception:
             _log.exception("a job's end could not be stored; once something can be, it is given back")
             self._unsettled.append(run)
         else:
             if job is None:
                 _log.warning("a job went on without attempt %d", run.job.attempt)
-            elif job.status is JobStatus.SUCCEEDED:
+            elif job.status is JobStatus.SUCCEEDED and not run.at_once:
                 self._lanes.ran(job.lane, [took])
         del self._runs[run.job.id]
         if job is not None and job.status.finished:
             self._tell_end(job, took)
         elif job is not None:
-            self._lanes.waiting[job.lane] += 1
-        self._give_back(run.job.lane)
-
-    async def _settle(self, run: Run, outcome: Outcome) -> Job | None:
-        """Bring an outcome into the table; None if the job has gone on without this attempt."""
-        job, progress, surely = run.job, run.progress, self._writer.write_surely
-        if isinstance(outcome, Returned):
-            try:
-                return await surely(
-                    self._store.succeed,
-                    job.id,
-                    job.attempt,
-                    outcome.work,
-                    progress,
-                    self._kinds[job.kind].on_success,
-                )
-            except Exception as exception:
-                _log.exception("a job's result could not be stored")
-                outcome = Raised(describe(exception), "")
-        if isinstance(outcome, Raised):
-            if outcome.error["code"] == INTERNAL_ERROR:
-                _log.error(
-                    "a job failed: %s",
-                    outcome.error["detail"],
-                    extra={"worker_traceback": outcome.traceback},
-                )
-            return await surely(self._store.fail, job.id, job.attempt, outcome.error, progress)
-        if run.killed_for == "stop":
-            return await surely(self._store.release, job.id, job.attempt, progress)
-        if run.killed_for == "time":
-            error = failure(
-                "time-limit-exceeded",
-                f"the work did not stop within {self._grace_s:g} s after its time limit, and was ended",
-            )
-            return await surely(self._store.fail, job.id, job.attempt, error, progress)
-        _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)
-        return await surely(self._store.lose, job.id, job.attempt, outcome.reason, progress)
+            self._waits(job, run.deadline)
+        if not run.at_once:
+            self._give_back(run.job.lane)
+        self._wake.set()
 
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
@@ -341,7 +351,6 @@ class Dispatcher:
 
     def _give_back(self, lane: Lane) -> None:
         self._lanes.running[lane] -= 1
-        self._wake.set()
 
     async def _look_after(self) -> None:
         """Give back the jobs whose end could not be stored, and those of other processes that have died."""
@@ -370,6 +379,8 @@ class Dispatcher:
                 self._tell_end(job, None)
         waiting = await self._writer.write(self._store.waiting)
         self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
+        for job_id, kind, deadline in await self._writer.write(self._store.deadlines):
+            self._watch(job_id, kind, deadline)
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

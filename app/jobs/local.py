@@ -36,6 +36,10 @@ from app.jobs.work_context import CANCEL, DEADLINE, new_control
 # The workers share the cores: one that starts threads of its own slows the others down, and itself.
 SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
+# Memory that glibc has once got it keeps, up to arrays of 32 MB: to get it again can take longer from the
+# system than all the work that is done in it, and what a worker takes stays what its largest job took.
+KEEPS_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 1024**2), "MALLOC_TRIM_THRESHOLD_": str(512 * 1024**2)}
+
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
 
 _log = logging.getLogger(__name__)
@@ -64,7 +68,7 @@ class LocalExecutor:
         slots: int,
         *,
         warm_up: str | None = None,
-        environment: Mapping[str, str] = SINGLE_THREADED,
+        environment: Mapping[str, str] = MappingProxyType(SINGLE_THREADED | KEEPS_MEMORY),
         log_level: str | None = None,
     ) -> None:
         if slots < 1:

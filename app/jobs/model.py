@@ -207,6 +207,9 @@ class JobKind:
         transaction back, and the job fails with that reason. It must be quick: writers wait for it.
     dropped_fields
         Of the payload: large ones that nobody needs any more once the job has ended.
+    at_once
+        As ``work``, but light and quick: answers a job that still waits when its time limit ends. None: such
+        a job waits for a worker all the same.
     """
 
     name: str
@@ -214,3 +217,4 @@ class JobKind:
     lane: Lane
     on_success: Callable[[Connection, Job, WorkResult], dict[str, Any]] | None = None
     dropped_fields: frozenset[str] = frozenset()
+    at_once: str | None = None

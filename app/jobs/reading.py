@@ -95,6 +95,16 @@ class JobReader:
             )
             return {row.lane: row.jobs for row in rows}
 
+    def deadlines(self) -> list[tuple[str, str, float]]:
+        """Return id, kind and deadline (seconds since 1970) of the waiting jobs that have one."""
+        with self._database.read() as connection:
+            rows = connection.execute(
+                sa.select(jobs.c.id, jobs.c.kind, jobs.c.deadline).where(
+                    jobs.c.status == JobStatus.QUEUED, jobs.c.deadline.is_not(None)
+                )
+            )
+            return [(row.id, row.kind, row.deadline) for row in rows]
+
     def recent_durations(self, lane: Lane, limit: int) -> list[float]:
         """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
         with self._database.read() as connection:

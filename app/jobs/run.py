@@ -6,6 +6,7 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import Literal
 
+from app.jobs.channel import Channel
 from app.jobs.executor import Execution
 from app.jobs.model import Job, Progress
 
@@ -21,10 +22,14 @@ class Run:
     ----------
     job, deadline
         As they were taken from the queue.
+    channel
+        Tells what happens to it.
     progress
         The newest; ``unsaved`` if it is not in the table yet, where the last went at ``saved_at``.
     execution
         The work; None until it is handed over.
+    at_once
+        Whether it holds no worker, because its time is up and it is answered beside them.
     killed_for
         Why its worker was killed, if it was.
     timers
@@ -33,9 +38,11 @@ class Run:
 
     job: Job
     deadline: float | None
+    channel: Channel
     progress: Progress
     saved_at: float
     unsaved: bool = False
+    at_once: bool = False
     execution: Execution | None = None
     killed_for: Reason | None = None
     timers: list[asyncio.TimerHandle] = field(default_factory=list)

@@ -36,6 +36,9 @@ class JobService:
         What can be submitted.
     executor
         Runs the work; it is started and closed by the service.
+    reserve
+        Answers the jobs that still wait when their time limit ends, where their kind has what does it; it is
+        started and closed by the service. None: they wait for a worker all the same.
     max_queued
         How many jobs may wait in each lane.
     max_attempts
@@ -54,6 +57,7 @@ class JobService:
         kinds: Sequence[JobKind],
         executor: Executor,
         *,
+        reserve: Executor | None = None,
         max_queued: int = 64,
         max_attempts: int = 3,
         overrun_grace_s: float = 5.0,
@@ -69,6 +73,7 @@ class JobService:
             owner,
             kinds,
             executor,
+            reserve,
             self._channels,
             max_queued=max_queued,
             overrun_grace_s=overrun_grace_s,
@@ -114,7 +119,7 @@ class JobService:
         payload
             JSON-ready; what the work function gets.
         time_limit_s
-            Counted from now, waiting included.
+            Counted from now, waiting included; 0 if it has passed.
         idempotency
             A key that was seen before with the same body gives the first job, in whatever state it is: a
             retry while it runs waits for it as the first caller does.
@@ -197,14 +202,13 @@ class JobService:
             If no job has that id.
         """
         end = None if timeout_s is None else time.monotonic() + timeout_s
+        channel = self._channels.open(job_id)
         while True:
-            channel = self._channels.find(job_id)
-            if channel is None or (channel.ended is None and not self._dispatcher.runs(job_id)):
+            bell = channel.changed
+            if channel.ended is None and not self._dispatcher.runs(job_id):
                 job = await self.get(job_id)
                 if job.status.finished:
                     return job
-                channel = self._channels.open(job_id)
-            bell = channel.changed
             if channel.ended is not None:
                 return channel.ended
             left = _LOOK_AGAIN_S if end is None else min(_LOOK_AGAIN_S, end - time.monotonic())
@@ -222,18 +226,16 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
+        channel = self._channels.open(job_id)
         while True:
-            channel = self._channels.find(job_id)
-            if channel is None or (channel.ended is None and not self._dispatcher.runs(job_id)):
+            bell = channel.changed
+            if channel.ended is None and not self._dispatcher.runs(job_id):
                 job = await self.get(job_id)
-                channel = self._channels.find(job_id)
-                if job.status.finished and (channel is None or channel.ended is None):
+                if job.status.finished and channel.ended is None:
                     for event in replay(job):
                         if event.id > after:
                             yield event
                     return
-                channel = self._channels.open(job_id)
-            bell = channel.changed
             ended = channel.ended is not None
             for event in channel.since(after):
                 after = event.id

@@ -195,9 +195,16 @@ class JobStore(JobReader):
             .limit(1)
             .scalar_subquery()
         )
+        return self._take(jobs.c.number == oldest)
+
+    def claim_this(self, job_id: str) -> Claim | None:
+        """Take a job out of its turn; None if it does not wait."""
+        return self._take(jobs.c.id == job_id)
+
+    def _take(self, which: sa.ColumnElement[bool]) -> Claim | None:
         take = (
             sa.update(jobs)
-            .where(jobs.c.number == oldest, jobs.c.status == JobStatus.QUEUED)
+            .where(which, jobs.c.status == JobStatus.QUEUED)
             .values(
                 status=JobStatus.RUNNING,
                 attempt=jobs.c.attempt + 1,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -20,20 +19,28 @@ from app.domain.records import problem_from_record, problem_to_record, to_record
 from app.jobs import bounding
 from app.jobs.answer_time import AnswerTime
 from app.jobs.model import Progress, WorkResult
+from app.jobs.time_limit import TimeLimit
 from app.jobs.work_context import WorkContext
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import explain
 from app.simulation.generator import generate
 from app.solvers import protocol
-from app.solvers.greedy import greedy_plan
 from app.solvers.registry import create_solver, parse_parameters
 
 _VERIFY = "app.learning.checkpoint:verify"
 _WARM_UP_TRANSFER = "app.learning.universal.warm_up:warm_up"
 
 _answer_time = AnswerTime()
-_SIZE_TIMED = (50, 100, 3)
-"""UAVs, areas and materials of the problem whose explanation is timed by the warm-up."""
+_SIZE_TIMED = (1000, 2000, 3)
+"""UAVs, areas and materials of the problem whose answer is timed by the warm-up: the largest by default."""
+
+_OVERRUNS_TIMED = {
+    "ga": _SIZE_TIMED, "local_search": _SIZE_TIMED, "auto": _SIZE_TIMED, "exact": _SIZE_TIMED,
+    "qmix": (100, 300, 3),
+}  # fmt: skip
+"""Algorithms whose preparations are timed by the warm-up, and at what size."""
+
+_ALONE = protocol.SolverContext()
 
 _WARM_UP_PARAMETERS: dict[str, dict[str, Any]] = {
     "greedy": {},
@@ -79,21 +86,62 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     """
     problem = problem_from_record(payload["problem"])
     algorithm, seed = payload["algorithm"], payload["seed"]
-    parameters = parse_parameters(algorithm, payload["parameters"])
+    limit = TimeLimit(context, _answer_time, problem, payload.get("bound_time_limit_s"))
+    if limit.leaves_none_for(algorithm):
+        return _at_once(problem, payload, limit, context)
+    solver = create_solver(algorithm, parse_parameters(algorithm, payload["parameters"]), _means(payload))
+    solution = solver.solve(problem, seed, limit.searching, _report(context))
+    limit.searched(algorithm)
+    return _result(problem, solution, payload, limit)
+
+
+def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+    """Answer a request whose time is up before a worker was free for it: by the plan of the greedy rule.
+
+    Needs no torch, so a process that does nothing else is light and soon ready.
+
+    Parameters
+    ----------
+    payload, context
+        As :func:`allocate` takes them.
+
+    Returns
+    -------
+    WorkResult
+        As :func:`allocate` returns it where its algorithm has no time to begin; the algorithm's refusals,
+        which need the algorithm, are left out.
+    """
+    problem = problem_from_record(payload["problem"])
+    limit = TimeLimit(context, _answer_time, problem, payload.get("bound_time_limit_s"))
+    return _at_once(problem, payload, limit, context)
+
+
+def _at_once(problem: Problem, payload: dict[str, Any], limit: TimeLimit, context: WorkContext) -> WorkResult:
+    """The greedy rule's plan, as far as it comes, in the name of the algorithm that was asked for."""
+    greedy = create_solver("greedy", parse_parameters("greedy", {}), _means(payload))
+    solution = greedy.solve(problem, payload["seed"], limit.bounding, _report(context))
+    asked = parse_parameters(payload["algorithm"], payload["parameters"])
+    return _result(problem, replace(solution, parameters=asked), payload, limit)
+
+
+def _means(payload: dict[str, Any]) -> protocol.SolverContext:
     # A job that was stored by an earlier version says nothing of threads.
-    solver_context = protocol.SolverContext(payload["library_url"], payload.get("threads", 1))
-    solver = create_solver(algorithm, parameters, solver_context)
-    bound_limit_s = payload.get("bound_time_limit_s")
-    solution = solver.solve(problem, seed, _stop(problem, context, bound_limit_s), _report(context))
-    answer = _explained(problem, solution.plan)
+    return protocol.SolverContext(payload["library_url"], payload.get("threads", 1))
+
+
+def _result(
+    problem: Problem, solution: protocol.Solution, payload: dict[str, Any], limit: TimeLimit
+) -> WorkResult:
+    answer = _explained(problem, solution.plan, limit)
     source = solution.source_policy
+    bound_limit_s = payload.get("bound_time_limit_s")
     result = {
-        "algorithm": algorithm,
+        "algorithm": payload["algorithm"],
         "parameters": solution.parameters.model_dump(mode="json"),
-        "seed": seed,
+        "seed": payload["seed"],
         **answer,
         "proof": bounding.proof_answer(problem, solution.proof),
-        **bounding.bound_answer(problem, answer["reward"], bound_limit_s, _stop(problem, context)),
+        **bounding.bound_answer(problem, answer["reward"], bound_limit_s, limit.bounding),
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
     }
@@ -148,64 +196,84 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
 
 def warm_up() -> None:
     """Load and compile what every kind of job needs, so that nobody waits for it later."""
+    problem = _small_problem()
+    for algorithm, parameters in _WARM_UP_PARAMETERS.items():
+        work = allocate(_request(problem, algorithm, parameters), _unlimited())
+        if work.artifact is not None:
+            _verify(work.artifact, problem)
+    _named(_WARM_UP_TRANSFER)(problem)
+    bounding.warm_up(problem)
+    compile_problem(replace(problem, crs="wgs84"))
+    _time_answers()
+    for algorithm, size in _OVERRUNS_TIMED.items():
+        large, solver = (
+            _large_problem(size),
+            create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE),
+        )
+        for _ in range(2):
+            begun = time.perf_counter()
+            solver.solve(large, 0, lambda: True, lambda _progress: None)
+            overrun = time.perf_counter() - begun
+        _answer_time.overran(algorithm, large, overrun)
+
+
+def warm_up_at_once() -> None:
+    """Load and compile what :func:`allocate_at_once` needs."""
+    problem = _small_problem()
+    allocate_at_once({**_request(problem, "greedy", {}), "bound_time_limit_s": 1.0}, _unlimited())
+    compile_problem(replace(problem, crs="wgs84"))
+    _time_answers()
+
+
+def _time_answers() -> None:
+    """Know how long answers take here before the first one is asked for in a short time.
+
+    The problem is a large one, so that the memory is there too that such a one takes: the system may need
+    longer to find it than all the work takes that is done in it.
+    """
+    problem = _small_problem()
+    planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
+    for each in (planned, *[_large_problem(_SIZE_TIMED)] * 2):
+        _answer_time.forget()
+        allocate_at_once(_request(each, "greedy", {}), _unlimited())
+
+
+def _small_problem() -> Problem:
     # Floats throughout, as requests have them: an array of integers would be compiled for apart.
     at, home = (1.0, 2.0), (0.0, 0.0)
-    problem = Problem(
+    return Problem(
         uavs=tuple(UAV(f"uav-{i}", *home, *home, 1.0, 10.0, (2.0, 1.0)) for i in (1, 2)),
         targets=tuple(Target(f"area-{j}", *at, 9.0, (1.0, 2.0), deadline=9.0) for j in (1, 2, 3)),
         max_steps=2,
     )
-    payload = {"problem": problem_to_record(problem), "seed": 0, "library_url": None}
-    for algorithm, parameters in _WARM_UP_PARAMETERS.items():
-        context = WorkContext.in_process(lambda _progress: None, time_limit_s=None)
-        work = allocate({**payload, "algorithm": algorithm, "parameters": parameters}, context)
-        if work.artifact is not None:
-            _verify(work.artifact, problem)
-    unloading = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    planned = {**payload, "problem": problem_to_record(unloading), "algorithm": "greedy", "parameters": {}}
-    allocate(planned, WorkContext.in_process(lambda _progress: None, time_limit_s=None))
-    _named(_WARM_UP_TRANSFER)(problem)
-    bounding.warm_up(problem)
-    compile_problem(replace(problem, crs="wgs84"))
-    # How long answers take here is known before the first one is asked for in a short time.
-    larger = generate("uniform", *_SIZE_TIMED, np.random.default_rng(0))
-    for _ in range(2):
-        _answer_time.forget()
-        _explained(larger, greedy_plan(larger))
 
 
-def _explained(problem: Problem, plan: Plan) -> dict[str, Any]:
+def _large_problem(size: tuple[int, int, int]) -> Problem:
+    return generate("uniform", *size, np.random.default_rng(0))
+
+
+def _request(problem: Problem, algorithm: str, parameters: dict[str, Any]) -> dict[str, Any]:
+    record = problem_to_record(problem)
+    return {
+        "problem": record, "algorithm": algorithm, "parameters": parameters, "seed": 0, "library_url": None
+    }  # fmt: skip
+
+
+def _unlimited() -> WorkContext:
+    return WorkContext.in_process(lambda _progress: None, time_limit_s=None)
+
+
+def _explained(problem: Problem, plan: Plan, limit: TimeLimit) -> dict[str, Any]:
     """Return an allocation by the field names of ``POST /allocate``, and note how long that took."""
     begun = time.perf_counter()
-    answer: dict[str, Any] = to_record(explain(problem, plan))
+    explained = explain(problem, plan, limit.hurries)
+    found = time.perf_counter()
+    answer: dict[str, Any] = to_record(explained)
     answer["assignment"] = answer.pop("plan")["assignment"]
-    _answer_time.took(problem, time.perf_counter() - begun)
+    _answer_time.wrote(problem, time.perf_counter() - found)
+    if not limit.hurries():
+        _answer_time.explained(problem, found - begun)
     return answer
-
-
-def _stop(
-    problem: Problem, context: WorkContext, bound_limit_s: float | None = None
-) -> protocol.StopCriterion:
-    """Stop at a cancellation, or when only the time is left that a bound and the answer's way back take."""
-    left = context.time_left()
-    if left is None:
-        return context.cancelled
-    reserve = _answer_time.kept_back(problem, left)
-    return _StopInTime(context, reserve + bounding.kept_for_bound(bound_limit_s, left - reserve))
-
-
-class _StopInTime:
-    """A :class:`~app.solvers.protocol.StopCriterion` that tells a search how long it has."""
-
-    def __init__(self, context: WorkContext, reserve: float) -> None:
-        self._context, self._reserve = context, reserve
-
-    def __call__(self) -> bool:
-        return self._context.cancelled() or self.seconds_left() <= 0.0
-
-    def seconds_left(self) -> float:
-        left = self._context.time_left()
-        return math.inf if left is None else left - self._reserve
 
 
 def _report(context: WorkContext) -> Callable[[protocol.Progress], None]:

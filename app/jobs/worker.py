@@ -5,6 +5,7 @@ Nothing here imports SQLAlchemy, numpy, numba or torch: what the work needs come
 
 from __future__ import annotations
 
+import gc
 import importlib
 import json
 import math
@@ -139,6 +140,9 @@ def warm_up(hook: str | None) -> int:
     """Run the hook that makes the first piece of work as quick as the later ones; return the process id."""
     if hook is not None:
         resolve(hook)()
+    # What is there now stays: to look through it for garbage would only hold up somebody's work.
+    gc.collect()
+    gc.freeze()
     return os.getpid()
 
 

@@ -7,41 +7,57 @@ from app.jobs.answer_time import AnswerTime
 from app.simulation.generator import generate
 
 RNG = np.random.default_rng(0)
-SMALL, LARGE = (generate("uniform", m, n, 2, RNG) for m, n in ((5, 10), (200, 400)))
+SMALL, LARGE, LARGER = (generate("uniform", m, n, 2, RNG) for m, n in ((5, 10), (200, 400), (800, 1600)))
 
 
 def test_a_larger_problem_and_a_slower_machine_keep_back_more():
     quick, slow = AnswerTime(), AnswerTime()
-    quick.took(LARGE, 0.010)
-    slow.took(LARGE, 0.050)
+    quick.wrote(LARGE, 0.010)
+    slow.wrote(LARGE, 0.050)
     for of in (quick, slow):
-        assert of.expected(SMALL) < of.expected(LARGE)
-    assert quick.expected(LARGE) > 0.010
-    assert slow.expected(LARGE) - slow.expected(SMALL) == pytest.approx(
-        5 * (quick.expected(LARGE) - quick.expected(SMALL))
+        assert of.way_back(SMALL) < of.way_back(LARGE)
+    assert quick.way_back(LARGE) > 0.010
+    assert slow.way_back(LARGE) - slow.way_back(SMALL) == pytest.approx(
+        5 * (quick.way_back(LARGE) - quick.way_back(SMALL))
     )
 
 
 def test_the_slowest_of_the_last_counts():
     of = AnswerTime()
-    of.took(LARGE, 0.5)
-    before = of.expected(LARGE)
-    of.took(LARGE, 0.01)
-    assert of.expected(LARGE) == before
+    of.wrote(LARGE, 0.5)
+    before = of.way_back(LARGE)
+    of.wrote(LARGE, 0.01)
+    assert of.way_back(LARGE) == before
     for _ in range(100):
-        of.took(LARGE, 0.01)
-    assert of.expected(LARGE) < before / 3
+        of.wrote(LARGE, 0.01)
+    assert of.way_back(LARGE) < before / 3
 
 
 def test_a_slow_small_answer_does_not_make_large_ones_look_endless():
     of = AnswerTime()
-    of.took(SMALL, 0.03)
-    assert of.expected(LARGE) < 0.5
+    of.wrote(SMALL, 0.03)
+    assert of.way_back(LARGE) < 1.0
 
 
-def test_the_search_keeps_most_of_a_short_time_and_none_of_what_has_passed():
+def test_reasons_get_a_share_of_a_short_time_and_none_of_what_has_passed():
     of = AnswerTime()
-    of.took(LARGE, 0.5)
-    assert of.kept_back(LARGE, 0.1) == pytest.approx(0.025)
-    assert of.kept_back(LARGE, 100.0) == of.expected(LARGE)
-    assert of.kept_back(LARGE, -1.0) == 0.0
+    of.wrote(LARGE, 0.01)
+    of.explained(LARGE, 0.5)
+    assert of.kept_back(LARGE, 0.1) == pytest.approx(of.way_back(LARGE) + 0.025)
+    assert of.kept_back(LARGE, 100.0) == pytest.approx(of.way_back(LARGE) + 0.5)
+    assert of.kept_back(LARGE, -1.0) == of.way_back(LARGE)
+
+
+def test_an_algorithm_that_would_only_prepare_is_not_begun_and_tried_again_later():
+    of = AnswerTime()
+    assert not of.is_too_short("ga", LARGE, 0.001)
+    of.overran("ga", LARGE, 0.1)
+    assert of.is_too_short("ga", LARGE, 0.05)
+    assert not of.is_too_short("ga", LARGE, 0.2)
+    # Neither other sizes nor other algorithms are judged by it.
+    assert not of.is_too_short("ga", LARGER, 0.05)
+    assert not of.is_too_short("greedy", LARGE, 0.05)
+    refused = 0
+    while of.is_too_short("ga", LARGE, 0.05):
+        refused += 1
+    assert 0 < refused < 10

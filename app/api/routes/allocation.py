@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request
@@ -80,7 +81,7 @@ async def allocate(
         ALLOCATE,
         # Not part of what makes a request the same: an operator may change it between two tries.
         payload | {"threads": services.settings.threads_per_job},
-        time_limit_s=body.time_limit_s,
+        time_limit_s=_left(body.time_limit_s, request),
         idempotency=idempotency(idempotency_key, ALLOCATE, payload, body.time_limit_s),
     )
     preferences = Preferences.of(request.headers.getlist("prefer"))
@@ -96,3 +97,11 @@ async def allocate(
         media_type="application/json",
         headers={"Preference-Applied": preferences.applied} if preferences.applied else None,
     )
+
+
+def _left(time_limit_s: float | None, request: Request) -> float | None:
+    """Return what is left of a time limit that began with the request's arrival."""
+    if time_limit_s is None:
+        return None
+    arrived_s: float = request.state.arrived_s
+    return max(0.0, time_limit_s - (time.monotonic() - arrived_s))

@@ -1,0 +1,91 @@
+"""Jobs that wait while their time limit runs out: when they have to be answered without a free worker.
+
+What answers them does one after the other, so it has to begin early enough for the last of those that end
+together. How long one takes is measured with each.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Sequence
+from statistics import fmean
+
+from app.jobs.channel import rung
+
+_REMEMBERED = 16
+_UNMEASURED_S = 0.05
+_LONGEST_LOOK_S = 60.0
+_PAUSE_S = 0.1
+
+_log = logging.getLogger(__name__)
+
+
+class LastMinute:
+    """Watches over jobs that wait.
+
+    Parameters
+    ----------
+    answer
+        Answers a job if it still waits, and says whether it did.
+    """
+
+    def __init__(self, answer: Callable[[str], Awaitable[bool]]) -> None:
+        self._answer = answer
+        self._deadlines: dict[str, float] = {}
+        self._took: deque[float] = deque(maxlen=_REMEMBERED)
+        self._changed = asyncio.Event()
+        self._ended = False
+
+    def watch(self, job_id: str, deadline: float) -> None:
+        """Take note of a job that waits, and when its time is up, in seconds since 1970."""
+        self._deadlines[job_id] = deadline
+        self._changed.set()
+
+    def forget(self, job_id: str) -> None:
+        """Take note that a job waits no more."""
+        self._deadlines.pop(job_id, None)
+
+    def end(self) -> None:
+        """Make :meth:`keep` return after what it is at."""
+        self._ended = True
+        self._changed.set()
+
+    async def keep(self) -> None:
+        """Answer the jobs whose time has come, until the end."""
+        while not self._ended:
+            self._changed.clear()
+            if not self._deadlines:
+                await self._changed.wait()
+                continue
+            in_s = latest_start(list(self._deadlines.values()), self._took) - time.time()
+            if in_s > 0:
+                await rung(self._changed, min(in_s, _LONGEST_LOOK_S))
+                continue
+            job_id = min(self._deadlines, key=self._deadlines.__getitem__)
+            deadline = self._deadlines.pop(job_id)
+            begun = time.monotonic()
+            try:
+                if await self._answer(job_id):
+                    self._took.append(time.monotonic() - begun)
+            except Exception:
+                _log.exception("a job's time is up and it could not be answered; there will be another try")
+                self._deadlines.setdefault(job_id, deadline)
+                await asyncio.sleep(_PAUSE_S)
+
+
+def latest_start(deadlines: Sequence[float], took_s: Sequence[float]) -> float:
+    """Return when to begin with the first, so that each is done in time.
+
+    Parameters
+    ----------
+    deadlines
+        When each has to be done, at least one.
+    took_s
+        How long the last ones took: the first is expected to take as long as the slowest, those after it as
+        long as the mean.
+    """
+    mean, longest = fmean(took_s or [_UNMEASURED_S]), max(took_s, default=_UNMEASURED_S)
+    return min(deadline - longest - place * mean for place, deadline in enumerate(sorted(deadlines)))

@@ -1,0 +1,56 @@
+"""However short its time and whoever has the workers: an allocation with a time limit gets a plan."""
+
+import json
+
+import numpy as np
+import pytest
+from referee import replay
+
+from app.domain.records import problem_to_record
+from app.simulation.generator import generate
+from app.solvers.registry import ALGORITHMS
+
+ENDLESS = {"algorithm": "qmix", "parameters": {"n_epochs": 10_000_000}}
+
+
+def sound(problem, answer):
+    replayed = replay(problem, answer["assignment"])
+    assert answer["reward"] == pytest.approx(replayed["reward"])
+    return replayed["reward"]
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("unloading", ["greedy", "planned"])
+def test_a_time_that_is_up_at_once_gives_a_legal_plan(client, algorithm, unloading):
+    problem = problem_to_record(generate("uniform", 3, 5, 2, np.random.default_rng(3)))
+    problem["objective"]["unloading"] = unloading
+    request = {**problem, "algorithm": algorithm, "time_limit_s": 1e-9, "bound": True}
+
+    answer = client.post("/allocate", json=request)
+
+    assert answer.status_code == 200, answer.text
+    told = answer.json()
+    assert told["algorithm"] == algorithm
+    assert told["reward"] > 0
+    assert told["bound"] >= told["reward"]
+    if unloading == "greedy":
+        sound(problem, told)
+        greedy = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
+        assert told["reward"] == pytest.approx(greedy["reward"])
+
+
+def test_whoever_waits_is_answered_when_the_time_is_up(start_service, problem):
+    client = start_service(workers=1, queue_limit=10).await_ready().client
+    holder = client.post("/allocate", json=problem | ENDLESS, headers={"Prefer": "respond-async"}).json()
+    request = problem | {"algorithm": "transfer_qmix", "time_limit_s": 0.3}
+    later = client.post("/allocate", json=request, headers={"Prefer": "respond-async"}).json()
+
+    answer = client.post("/allocate", json=request)
+
+    assert answer.status_code == 200
+    assert sound(problem, answer.json()) > 0
+    with client.stream("GET", f"/jobs/{later['id']}/events") as events:
+        last = [json.loads(line[5:]) for line in events.iter_lines() if line.startswith("data:")][-1]
+    assert last["status"] == "succeeded"
+    assert client.get(f"/jobs/{holder['id']}").json()["status"] == "running"
+    assert client.delete(f"/jobs/{holder['id']}").status_code == 202

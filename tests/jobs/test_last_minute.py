@@ -1,0 +1,120 @@
+"""Jobs whose time limit ends while all workers are busy: answered beside them, once, whatever dies."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from harness import KINDS, eventually, finished, running
+
+from app.jobs.last_minute import latest_start
+from app.jobs.local import LocalExecutor
+from app.jobs.model import JobKind, JobStatus
+
+HASTY = (
+    *KINDS,
+    JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:echo"),
+    JobKind("fragile", "job_work:until_file", "interactive", at_once="job_work:die"),
+)
+
+
+def test_the_last_of_those_that_end_together_is_in_time_too():
+    assert latest_start([100.0], [0.2]) == pytest.approx(99.8)
+    assert latest_start([100.0, 100.0, 100.0], [0.2]) == pytest.approx(99.4)
+    assert latest_start([100.0, 110.0], [0.2, 0.4]) == pytest.approx(99.6)
+    # The first is expected to take as long as the slowest, the others as the mean.
+    assert latest_start([100.0, 100.0], [0.2, 0.4]) == pytest.approx(99.3)
+    assert latest_start([100.0], []) < 100.0
+
+
+def busy(tmp_path, **settings):
+    return running(tmp_path, kinds=HASTY, reserve=LocalExecutor(1), **settings)
+
+
+def gate(tmp_path) -> dict[str, str]:
+    return {"path": str(tmp_path / "gate")}
+
+
+def test_a_waiting_job_is_answered_when_its_time_is_up(tmp_path):
+    async def scenario():
+        async with busy(tmp_path) as service:
+            holder, _ = await service.submit("until_file", gate(tmp_path))
+            jobs = [(await service.submit("hasty", {"n": n}, time_limit_s=0.2))[0] for n in range(5)]
+            patient, _ = await service.submit("echo", {}, time_limit_s=0.2)
+            for job in jobs:
+                done = await finished(service, job)
+                assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
+                assert done.result["echo"] == job.payload
+            # The worker was busy all the while, and who has nothing for the last minute waits for it.
+            assert (await service.get(holder.id)).status is JobStatus.RUNNING
+            assert (await service.get(patient.id)).status is JobStatus.QUEUED
+            assert service.load().waiting["interactive"] == 1
+            Path(gate(tmp_path)["path"]).touch()
+            assert (await finished(service, patient)).result
+            assert sum(service.load().running.values()) == 0
+
+    asyncio.run(scenario())
+
+
+def test_a_job_that_gets_a_worker_in_time_is_done_by_it(tmp_path):
+    async def scenario():
+        async with busy(tmp_path) as service:
+            holder, _ = await service.submit("until_file", gate(tmp_path))
+            job, _ = await service.submit("hasty", gate(tmp_path), time_limit_s=3600.0)
+            Path(gate(tmp_path)["path"]).touch()
+            done = await finished(service, job)
+            assert "echo" not in done.result
+            assert done.result["pid"] == (await finished(service, holder)).result["pid"]
+
+    asyncio.run(scenario())
+
+
+def test_one_that_is_cancelled_first_is_not_answered(tmp_path):
+    async def scenario():
+        async with busy(tmp_path) as service:
+            await service.submit("until_file", gate(tmp_path))
+            job, _ = await service.submit("hasty", {}, time_limit_s=3600.0)
+            await service.cancel(job.id)
+            after, _ = await service.submit("hasty", {}, time_limit_s=0.0)
+            await finished(service, after)
+            done = await service.get(job.id)
+            assert (done.status, done.attempt) == (JobStatus.CANCELLED, 0)
+            Path(gate(tmp_path)["path"]).touch()
+
+    asyncio.run(scenario())
+
+
+def test_one_whose_process_dies_is_tried_again_and_fails_after_three(tmp_path):
+    async def scenario():
+        async with busy(tmp_path) as service:
+            holder, _ = await service.submit("until_file", gate(tmp_path))
+            twice = {"log": str(tmp_path / "twice"), "deaths": 2}
+            often = {"log": str(tmp_path / "often"), "deaths": 99}
+            job, _ = await service.submit("fragile", twice, time_limit_s=0.0)
+            done = await finished(service, job)
+            assert (done.status, done.attempt, done.result) == (JobStatus.SUCCEEDED, 3, {"deaths": 2})
+            killer, _ = await service.submit("fragile", often, time_limit_s=0.0)
+            failed = await finished(service, killer)
+            assert (failed.status, failed.error["code"]) == (JobStatus.FAILED, "worker-lost")
+            after, _ = await service.submit("hasty", {}, time_limit_s=0.0)
+            assert (await finished(service, after)).status is JobStatus.SUCCEEDED
+            assert (await service.get(holder.id)).attempt == 1
+            assert service.load().restarts == 5
+            Path(gate(tmp_path)["path"]).touch()
+
+    asyncio.run(scenario())
+
+
+def test_one_that_an_earlier_process_took_in_is_answered_too(tmp_path):
+    async def scenario():
+        # Without a reserve it waits, and is still there at the next start.
+        async with running(tmp_path, kinds=HASTY) as service:
+            holder, _ = await service.submit("until_file", gate(tmp_path))
+            job, _ = await service.submit("hasty", {}, time_limit_s=0.0)
+            await eventually(lambda: service.load().waiting["interactive"] == 1)
+        async with busy(tmp_path) as service:
+            done = await finished(service, job)
+            assert done.result == {"echo": {}, "pid": done.result["pid"]}
+            assert not (await service.get(holder.id)).status.finished
+            Path(gate(tmp_path)["path"]).touch()
+
+    asyncio.run(scenario())
