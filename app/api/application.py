@@ -109,7 +109,7 @@ def create_application(settings: Settings) -> FastAPI:
         application.include_router(room.router)
     install_error_handlers(application)
     install_dashboard(application, settings)
-    install_documentation(application, keys_required=settings.always_needs_keys)
+    install_documentation(application, settings)
     return application
 
 

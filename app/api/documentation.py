@@ -17,6 +17,7 @@ from starlette.staticfiles import StaticFiles
 from app.api.access.guard import SCHEME, document, needed_role
 from app.api.problem_details import ProblemDetails, responses
 from app.api.security_headers import content_policy
+from app.settings import Settings
 
 DESCRIPTION = """\
 Who flies where, with what: plans for swarms of UAVs that carry relief materials, after Yin, Guo, Su and Wang,
@@ -39,13 +40,22 @@ _ASSETS = "/docs/assets"
 _INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 
+def _name_limits(components: dict[str, Any], settings: Settings) -> None:
+    """Say in the schemas how large a problem may be here, which is the operator's to set."""
+    for name in ("ProblemModel", "AllocationRequest"):
+        components[name]["properties"]["uavs"]["maxItems"] = settings.max_uavs
+        components[name]["properties"]["targets"]["maxItems"] = settings.max_targets
+    for name in ("UAVModel", "TargetModel"):
+        components[name]["properties"]["loadlist"]["maxItems"] = settings.max_materials
+
+
 def operation_id(route: APIRoute) -> str:
     """Name an operation by its function, so that generated clients keep their names."""
     return route.name
 
 
-def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
-    """Give an application its ``/docs``, and errors and keys in its description."""
+def install_documentation(application: FastAPI, settings: Settings) -> None:
+    """Give an application its ``/docs``, and errors, keys and limits in its description."""
     generate = application.openapi
 
     def openapi() -> dict[str, Any]:
@@ -56,10 +66,13 @@ def install_documentation(application: FastAPI, *, keys_required: bool) -> None:
             components = schema["components"]["schemas"]
             components |= problem.pop("$defs")
             components["ProblemDetails"] = problem
+            _name_limits(components, settings)
             schema["components"]["securitySchemes"] = {"ApiKey": SCHEME}
             for path, operations in schema["paths"].items():
                 for method, operation in operations.items():
-                    document(operation, needed_role(method.upper(), path), required=keys_required)
+                    document(
+                        operation, needed_role(method.upper(), path), required=settings.always_needs_keys
+                    )
                     if "requestBody" in operation:
                         timeout = {str(k): v for k, v in responses("request-timeout").items()}
                         operation["responses"] = timeout | operation["responses"]

@@ -3,6 +3,7 @@
 RequestError
  ├─ MalformedJson           the body is no JSON
  ├─ UnsupportedMediaType    the body is not sent as JSON
+ ├─ UnsupportedContentEncoding  the body is sent compressed
  ├─ BodyTooLarge            the body has more bytes than are taken
  ├─ NotReady                a part of the service does not answer
  ├─ JobCancelled            a job that somebody waits for was cancelled before it had a plan
@@ -64,6 +65,17 @@ class UnsupportedMediaType(RequestError):
             "unsupported-media-type",
             f"the body's content type is {given or 'not given'}, it has to be application/json",
             headers={"Accept": "application/json"},
+        )
+
+
+class UnsupportedContentEncoding(RequestError):
+    """The body is sent compressed."""
+
+    def __init__(self, given: str) -> None:
+        super().__init__(
+            "unsupported-media-type",
+            f"the body's content encoding is {given}, it has to be sent as it is",
+            headers={"Accept-Encoding": "identity"},
         )
 
 

@@ -17,7 +17,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.errors import BodyTooLarge, MalformedJson, UnsupportedMediaType
+from app.api.errors import BodyTooLarge, MalformedJson, UnsupportedContentEncoding, UnsupportedMediaType
 from app.api.problem_details import problem_response
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -42,6 +42,7 @@ class JsonRoute(APIRoute):
             request.state.arrived_s = time.monotonic()
             if body:
                 _require_json(request.headers.get("content-type", ""))
+                _require_plain(request.headers.get("content-encoding", ""))
                 await request.json()
             return await handle(request)
 
@@ -94,6 +95,12 @@ def _require_json(content_type: str) -> None:
     subtype = header.get_content_subtype()
     if header.get_content_maintype() != "application" or not (subtype == "json" or subtype.endswith("+json")):
         raise UnsupportedMediaType(content_type[:100])
+
+
+def _require_plain(content_encoding: str) -> None:
+    """Refuse what is compressed: unpacked it could have any size."""
+    if content_encoding.strip().lower() not in ("", "identity"):
+        raise UnsupportedContentEncoding(content_encoding[:100])
 
 
 class BodyLimit:

@@ -13,6 +13,7 @@ from http import HTTPStatus
 from typing import Any
 
 import h11
+from structlog.contextvars import bound_contextvars
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from app.api.problem_details import problem_response
@@ -41,6 +42,8 @@ class _DeadlineProtocol(H11Protocol):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._deadline: asyncio.TimerHandle | None = None
+        # Of a request that is refused before the application has it; its connection ends with it.
+        self._refused_id = uuid.uuid4().hex
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
         super().connection_made(transport)
@@ -51,7 +54,9 @@ class _DeadlineProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def handle_events(self) -> None:
-        super().handle_events()
+        # What the server logs here is of a request that it refuses; others get the id of their own.
+        with bound_contextvars(request_id=self._refused_id):
+            super().handle_events()
         if self._receives():
             self._arm()
         else:
@@ -81,7 +86,8 @@ class _DeadlineProtocol(H11Protocol):
             self._answer(
                 "request-timeout", f"the request was not received within {self.receive_timeout_s:g} s"
             )
-        self.logger.info("a request was not received within %g s", self.receive_timeout_s)
+        with bound_contextvars(request_id=self._refused_id):
+            self.logger.info("a request was not received within %g s", self.receive_timeout_s)
         if self.cycle is not None and not self.cycle.response_complete:
             # Whoever reads the body learns that there is no more of it, and what they answer is not sent.
             self.cycle.disconnected = True
@@ -101,7 +107,7 @@ class _DeadlineProtocol(H11Protocol):
             code,
             detail,
             path,
-            headers={**SECURITY_HEADERS, "X-Request-ID": uuid.uuid4().hex, "Connection": "close"},
+            headers={**SECURITY_HEADERS, "X-Request-ID": self._refused_id, "Connection": "close"},
         )
         phrase = HTTPStatus(refusal.status_code).phrase.encode()
         head = h11.Response(status_code=refusal.status_code, headers=refusal.raw_headers, reason=phrase)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Coroutine, Sequence
+from collections.abc import Coroutine, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -159,7 +159,8 @@ class Dispatcher:
     ) -> tuple[Job, bool]:
         lane = kind.lane
         run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
-        limit = QueueLimit(self._max_queued, self._lanes.time_to_work_off(lane, self._max_queued))
+        worked_off_s = self._lanes.time_to_work_off(lane, self._max_queued, self._running(lane))
+        limit = QueueLimit(self._max_queued, worked_off_s)
         if run_now:
             self._lanes.running[lane] += 1
         try:
@@ -189,6 +190,14 @@ class Dispatcher:
             self._give_back(lane)
             self._wake.set()
         return claim.job, created
+
+    def _running(self, lane: Lane) -> Iterator[tuple[float, float | None]]:
+        """Tell of what runs in a lane for how long it has, and how long its time limit leaves it."""
+        now = time.time()
+        for run in self._runs.values():
+            if run.job.lane == lane and not run.at_once and run.job.started_at is not None:
+                ran_s = max(0.0, now - run.job.started_at.timestamp())
+                yield ran_s, None if run.deadline is None else run.deadline - now
 
     async def cancel(self, job_id: str) -> Job:
         """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""

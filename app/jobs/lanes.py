@@ -56,11 +56,36 @@ class Lanes:
         """Note how long jobs of the lane took."""
         self._durations[lane].extend(durations_s)
 
-    def time_to_work_off(self, lane: Lane, waiting: int) -> float:
+    def time_to_work_off(
+        self, lane: Lane, waiting: int, running: Iterable[tuple[float, float | None]]
+    ) -> float:
         """Return the seconds in which ``waiting`` jobs of the lane will have been started, at least 1.
 
-        The mean of the last durations, times the jobs, over the workers that the lane can have.
+        Parameters
+        ----------
+        lane
+            The lane.
+        waiting
+            How many jobs wait.
+        running
+            Of the jobs of the lane that run, for how long they have, and how long their time limit leaves
+            them if they have one. Who has run longer than others did is expected to go on for as long again.
+
+        Returns
+        -------
+        float
+            What is left of the one that ends first where no worker is free, and the mean of the last
+            durations and of what runs longer, times the jobs, over the workers that the lane can have.
         """
-        durations = tuple(self._durations[lane])
-        mean = fmean(durations) if durations else _UNMEASURED_DURATION_S
-        return max(1.0, mean * waiting / self._workers[lane])
+        now = tuple(running)
+        ended = tuple(self._durations[lane])
+        mean = fmean(ended) if ended else _UNMEASURED_DURATION_S
+        rests = []
+        for ran_s, left_s in now:
+            rest = max(mean - ran_s, ran_s)
+            rests.append(rest if left_s is None else min(rest, max(0.0, left_s)))
+        longer = [ran_s + rest for (ran_s, _), rest in zip(now, rests, strict=True) if ran_s > mean]
+        mean = max(mean, fmean([*ended, *longer])) if longer else mean
+        workers = self._workers[lane]
+        first = min(rests) if len(rests) >= workers else 0.0
+        return max(1.0, first + mean * waiting / workers)

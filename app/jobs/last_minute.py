@@ -17,6 +17,7 @@ from app.jobs.channel import rung
 
 _REMEMBERED = 16
 _UNMEASURED_S = 0.05
+_CAUTION = 1.5
 _LONGEST_LOOK_S = 60.0
 _PAUSE_S = 0.1
 
@@ -85,7 +86,7 @@ def latest_start(deadlines: Sequence[float], took_s: Sequence[float]) -> float:
         When each has to be done, at least one.
     took_s
         How long the last ones took: the first is expected to take as long as the slowest, those after it as
-        long as the mean.
+        long as the mean, and half as long again.
     """
-    mean, longest = fmean(took_s or [_UNMEASURED_S]), max(took_s, default=_UNMEASURED_S)
+    mean, longest = _CAUTION * fmean(took_s or [_UNMEASURED_S]), max(took_s, default=_UNMEASURED_S)
     return min(deadline - longest - place * mean for place, deadline in enumerate(sorted(deadlines)))

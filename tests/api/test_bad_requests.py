@@ -1,6 +1,7 @@
 """What is refused: with which status, which problem type, and which pointer."""
 
 import copy
+import gzip
 import json
 
 import pytest
@@ -177,6 +178,15 @@ def test_body_in_another_format(client, problem, content_type):
     response = client.post("/allocate", content=json.dumps(problem), headers=headers)
 
     assert "application/json" in refusal(response, 415, "unsupported-media-type")["detail"]
+
+
+def test_body_that_is_compressed(client, problem):
+    headers = {"Content-Type": "application/json", "Content-Encoding": "gzip"}
+
+    response = client.post("/allocate", content=gzip.compress(json.dumps(problem).encode()), headers=headers)
+
+    assert "gzip" in refusal(response, 415, "unsupported-media-type")["detail"]
+    assert response.headers["accept-encoding"] == "identity"
 
 
 @pytest.mark.parametrize("announced", [True, False])

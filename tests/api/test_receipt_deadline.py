@@ -1,6 +1,10 @@
 """Slow senders and what is no HTTP, on real sockets: they are closed in time, and nobody else is."""
 
 import asyncio
+import io
+import json
+import logging
+import re
 import socket
 import threading
 import time
@@ -10,6 +14,7 @@ import pytest
 import uvicorn
 
 from app.api.receipt_deadline import protocol_with_deadline
+from app.logs import configure_logs
 
 SHORT_S, LONG_S = 0.4, 60.0
 PATIENCE_S = 20.0
@@ -108,6 +113,25 @@ def test_what_is_no_http_gets_problem_details(address, garbage):
     assert received.startswith(b"HTTP/1.1 400 ")
     assert b"application/problem+json" in received
     assert b'"type":"bad-request"' in received
+
+
+def test_what_is_refused_unread_is_logged_with_the_id_of_its_answer(address):
+    log = io.StringIO()
+    configured = logging.getLogger()
+    before = configured.handlers[:], configured.level
+    configure_logs("info", log)
+    try:
+        ids = []
+        for sent in (b"\x16\x03\x01\r\n\r\n", HEAD + b"1234"):
+            with connected(address) as connection:
+                connection.sendall(sent)
+                head = until_closed(connection)[0].partition(b"\r\n\r\n")[0].lower()
+            ids.append(re.search(rb"x-request-id: (\w+)", head)[1].decode())
+    finally:
+        configured.handlers[:] = before[0]
+        configured.setLevel(before[1])
+    lines = [json.loads(line) for line in log.getvalue().splitlines()]
+    assert [line["request_id"] for line in lines] == ids
 
 
 def test_garbage_behind_an_answer_closes_without_another(address):

@@ -19,10 +19,10 @@ HASTY = (
 
 def test_the_last_of_those_that_end_together_is_in_time_too():
     assert latest_start([100.0], [0.2]) == pytest.approx(99.8)
-    assert latest_start([100.0, 100.0, 100.0], [0.2]) == pytest.approx(99.4)
+    assert latest_start([100.0, 100.0, 100.0], [0.2]) == pytest.approx(99.2)
     assert latest_start([100.0, 110.0], [0.2, 0.4]) == pytest.approx(99.6)
-    # The first is expected to take as long as the slowest, the others as the mean.
-    assert latest_start([100.0, 100.0], [0.2, 0.4]) == pytest.approx(99.3)
+    # The first is expected to take as long as the slowest, the others half as long again as the mean.
+    assert latest_start([100.0, 100.0], [0.2, 0.4]) == pytest.approx(99.15)
     assert latest_start([100.0], []) < 100.0
 
 

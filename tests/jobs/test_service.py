@@ -168,11 +168,25 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
 
 def test_retry_after_follows_durations_depth_and_workers():
     lanes = Lanes(3)
-    assert lanes.time_to_work_off("interactive", 0) == 1.0
+    assert lanes.time_to_work_off("interactive", 0, []) == 1.0
     lanes.ran("interactive", [4.0, 8.0])
     lanes.ran("training", [100.0])
-    assert lanes.time_to_work_off("interactive", 10) == 6.0 * 10 / 3
-    assert lanes.time_to_work_off("training", 4) == 100.0 * 4 / 2
+    assert lanes.time_to_work_off("interactive", 10, []) == 6.0 * 10 / 3
+    assert lanes.time_to_work_off("training", 4, []) == 100.0 * 4 / 2
+    # Of three that run the first has 2 s left of its 6, and the next has to wait for it.
+    fresh = [(4.0, None), (1.0, None), (1.0, None)]
+    assert lanes.time_to_work_off("interactive", 3, fresh) == 2.0 + 6.0 * 3 / 3
+    assert lanes.time_to_work_off("interactive", 3, fresh[:2]) == 6.0 * 3 / 3
+
+
+def test_retry_after_believes_what_runs_longer_than_what_ran():
+    lanes = Lanes(1)
+    lanes.ran("interactive", [0.1, 0.1])
+    endless = [(60.0, None)]
+    # It goes on for as long again, and those behind it take as long as the mean of all three: 40.07 s.
+    assert lanes.time_to_work_off("interactive", 2, endless) == pytest.approx(60.0 + 2 * (0.2 + 120.0) / 3)
+    # A time limit is kept.
+    assert lanes.time_to_work_off("interactive", 0, [(60.0, 5.0)]) == 5.0
 
 
 def test_trainings_leave_a_worker_to_what_somebody_waits_for(tmp_path):

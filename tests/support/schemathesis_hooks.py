@@ -1,31 +1,111 @@
 """What Schemathesis has to know of this service: loaded by it, as `SCHEMATHESIS_HOOKS` names it.
 
-Two things no JSON Schema can say, and one that keeps a run short. Everything else is checked as it comes.
+It takes a 422 to a request that keeps to the schema for a defect, and a job that can be read after its
+DELETE. Some rules no JSON Schema can say, and cancelled jobs stay readable by contract. Nothing is excused
+for its kind alone: for each refusal the rule is applied to the request again, here, and has to be broken.
+Everything else is checked as it comes; `invalid-request` is never excused.
 """
 
+import base64
+import binascii
+import json
+import sys
+from pathlib import Path
+
+import safetensors
 import schemathesis
 from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
 
-BEYOND_SCHEMAS = {
-    "invalid-problem",  # as many amounts as there are materials, ids that are unique, degrees on the globe
-    "problem-too-large",  # the operator's limits
-    "invalid-parameters",  # which there are depends on the algorithm
-    "invalid-checkpoint",  # base64 of what is no checkpoint
-    "idempotency-key-reused",  # with another body
-}
-"""Problem types that may answer a request which keeps to the schema; `invalid-request` never may."""
+sys.path.append(str(Path(__file__).parents[2]))
+
+from app.domain.errors import InvalidParameters
+from app.solvers.registry import parse_parameters
 
 LONGEST_S = 0.05
 LARGEST_LIMIT_S = 604_800
 SHORT_TRAINING = {"n_epochs": 3, "mode": "paper"}
+LIMITED_BY_SIZE = {"dqn", "qmix", "transfer_qmix", "ga"}
+"""Algorithms whose tables, buffers or populations have a limit that depends on several fields at once."""
+
+_keys_sent: set[str] = set()
+
+
+def breaks_rules(problem):
+    """Say whether a problem breaks a rule between fields: materials, ids, degrees on the globe."""
+    groups = problem["uavs"], problem["targets"]
+    if len({len(each["loadlist"]) for group in groups for each in group}) > 1:
+        return True
+    for group, default in zip(groups, ("uav-", "area-"), strict=True):
+        ids = [each.get("id") or f"{default}{number}" for number, each in enumerate(group, 1)]
+        if len(set(ids)) < len(ids) or not all(each.isprintable() for each in ids):
+            return True
+    points = [
+        (each[x], each[y])
+        for group in groups
+        for each in group
+        for x, y in (("x", "y"), ("x_s", "y_s"), ("x_c", "y_c"))
+        if each.get(x) is not None and each.get(y) is not None
+    ]
+    return problem.get("crs") == "wgs84" and any(abs(x) > 180 or abs(y) > 90 for x, y in points)
+
+
+def has_wrong_parameters(asked, default):
+    """Say whether an algorithm refuses the parameters it is given; which there are depends on its name."""
+    try:
+        parse_parameters(asked.get("algorithm", default), asked.get("parameters", {}))
+    except InvalidParameters:
+        return True
+    return False
+
+
+def is_no_checkpoint(text):
+    """Say whether a text in base64 is no safetensors file with the description of a checkpoint in it."""
+    try:
+        file = base64.b64decode(text, validate=True)
+        safetensors.deserialize(file)
+    except (binascii.Error, safetensors.SafetensorError):
+        return True
+    header = json.loads(file[8 : 8 + int.from_bytes(file[:8], "little")])
+    return "checkpoint" not in header.get("__metadata__", {})
+
+
+def breaks_rule_beyond_schemas(case, kind):
+    """Say whether a request breaks the rule that it was refused for."""
+    body = case.body
+    problem = body if case.path == "/allocate" else body.get("task")
+    asked, default = (body, "transfer_qmix") if case.path == "/allocate" else (body.get("train"), "qmix")
+    if kind == "invalid-problem":
+        return problem is not None and breaks_rules(problem)
+    if kind == "invalid-parameters":
+        return asked is not None and has_wrong_parameters(asked, default)
+    if kind == "problem-too-large":
+        return asked is not None and asked.get("algorithm", default) in LIMITED_BY_SIZE
+    if kind == "invalid-checkpoint":
+        return "checkpoint" in body and is_no_checkpoint(body["checkpoint"])
+    if kind == "idempotency-key-reused":
+        return case.headers.get("Idempotency-Key") in _keys_sent
+    return False
 
 
 @schemathesis.hook
 def filter_failure(ctx, failure, case, response):
-    """Keep every failure but those of rules between fields, and of cancelled jobs, which stay readable."""
+    """Keep every failure but refusals by a rule that was broken, and reading jobs that were cancelled."""
     if isinstance(failure, RejectedPositiveData) and response.status_code == 422:
-        return response.json()["type"] not in BEYOND_SCHEMAS
-    return not (isinstance(failure, UseAfterFree) and case.path.startswith("/jobs/{job_id}"))
+        return not breaks_rule_beyond_schemas(case, response.json()["type"])
+    if isinstance(failure, UseAfterFree) and case.method == "GET" and case.path == "/jobs/{job_id}":
+        return response.json()["status"] == "queued"
+    return not (
+        isinstance(failure, UseAfterFree)
+        and case.method == "GET"
+        and case.path in ("/jobs/{job_id}/events", "/jobs/{job_id}/plan")
+    )
+
+
+@schemathesis.hook
+def after_call(ctx, case, response):
+    """Remember the keys that requests came with."""
+    if case.headers.get("Idempotency-Key"):
+        _keys_sent.add(case.headers["Idempotency-Key"])
 
 
 @schemathesis.hook
