@@ -82,7 +82,7 @@ class Lanes:
         mean = fmean(ended) if ended else _UNMEASURED_DURATION_S
         rests = []
         for ran_s, left_s in now:
-            rest = max(mean - ran_s, ran_s)
+            rest = mean - ran_s if ran_s < mean else ran_s
             rests.append(rest if left_s is None else min(rest, max(0.0, left_s)))
         longer = [ran_s + rest for (ran_s, _), rest in zip(now, rests, strict=True) if ran_s > mean]
         mean = max(mean, fmean([*ended, *longer])) if longer else mean

@@ -1,8 +1,6 @@
 """Slow senders and what is no HTTP, on real sockets: they are closed in time, and nobody else is."""
 
 import asyncio
-import io
-import json
 import logging
 import re
 import socket
@@ -14,7 +12,7 @@ import pytest
 import uvicorn
 
 from app.api.receipt_deadline import protocol_with_deadline
-from app.logs import configure_logs
+from app.logs import labels
 
 SHORT_S, LONG_S = 0.4, 60.0
 PATIENCE_S = 20.0
@@ -43,11 +41,10 @@ async def application(scope, receive, send):
 
 
 @contextmanager
-def served(deadline_s):
+def served(deadline_s, **settings):
     listening = socket.create_server(("127.0.0.1", 0), backlog=256)
-    config = uvicorn.Config(
-        application, http=protocol_with_deadline(deadline_s), log_level="warning", timeout_graceful_shutdown=1
-    )
+    settings = {"log_level": "warning", "timeout_graceful_shutdown": 1, **settings}
+    config = uvicorn.Config(application, http=protocol_with_deadline(deadline_s), **settings)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
@@ -115,23 +112,28 @@ def test_what_is_no_http_gets_problem_details(address, garbage):
     assert b'"type":"bad-request"' in received
 
 
-def test_what_is_refused_unread_is_logged_with_the_id_of_its_answer(address):
-    log = io.StringIO()
-    configured = logging.getLogger()
-    before = configured.handlers[:], configured.level
-    configure_logs("info", log)
-    try:
-        ids = []
+def test_what_is_refused_unread_is_logged_with_the_id_of_its_answer():
+    logged, ids = _RequestIds(), []
+    with served(SHORT_S, log_level="info") as address:
+        logging.getLogger("uvicorn.error").addHandler(logged)
         for sent in (b"\x16\x03\x01\r\n\r\n", HEAD + b"1234"):
             with connected(address) as connection:
                 connection.sendall(sent)
                 head = until_closed(connection)[0].partition(b"\r\n\r\n")[0].lower()
             ids.append(re.search(rb"x-request-id: (\w+)", head)[1].decode())
-    finally:
-        configured.handlers[:] = before[0]
-        configured.setLevel(before[1])
-    lines = [json.loads(line) for line in log.getvalue().splitlines()]
-    assert [line["request_id"] for line in lines] == ids
+    logging.getLogger("uvicorn.error").removeHandler(logged)
+    assert [each for each in logged.ids if each is not None] == ids
+
+
+class _RequestIds(logging.Handler):
+    """Notes the request's id that each line is logged with, which the service's log writes out."""
+
+    def __init__(self):
+        super().__init__()
+        self.ids = []
+
+    def emit(self, record):
+        self.ids.append(labels().get("request_id"))
 
 
 def test_garbage_behind_an_answer_closes_without_another(address):
