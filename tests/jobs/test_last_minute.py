@@ -13,6 +13,7 @@ from app.jobs.model import JobKind, JobStatus
 HASTY = (
     *KINDS,
     JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:echo"),
+    JobKind("stubborn", "job_work:deaf", "interactive", at_once="job_work:echo"),
     JobKind("fragile", "job_work:until_file", "interactive", at_once="job_work:die"),
 )
 
@@ -100,6 +101,17 @@ def test_one_whose_process_dies_is_tried_again_and_fails_after_three(tmp_path):
             assert (await service.get(holder.id)).attempt == 1
             assert service.load().restarts == 5
             Path(gate(tmp_path)["path"]).touch()
+
+    asyncio.run(scenario())
+
+
+def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_path):
+    async def scenario():
+        async with busy(tmp_path, overrun_grace_s=0.1) as service:
+            job, _ = await service.submit("stubborn", {}, time_limit_s=0.2)
+            done = await finished(service, job)
+            assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
+            assert done.result["echo"] == {}
 
     asyncio.run(scenario())
 
