@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
+from statistics import median_high
 
 from app.domain.problem import Problem
 
@@ -26,10 +28,11 @@ _FORGETTING = 0.8
 
 
 class AnswerTime:
-    """Expects of the next answer what the slowest of the last ones took, for its size.
+    """Expects of the next answer what the last ones took, for its size: their median, since on a busy machine
+    one of them takes ten times as long now and then, and would leave no time to any search for long.
 
-    Of an algorithm it expects that it returns as late after its time as it lately did at most: that is what
-    it cannot interrupt, mostly its preparations.
+    Of an algorithm it expects that it returns as late after its time as it lately did: that is what it cannot
+    interrupt, mostly its preparations.
     """
 
     def __init__(self) -> None:
@@ -48,7 +51,7 @@ class AnswerTime:
     def overran(self, algorithm: str, problem: Problem, seconds: float) -> None:
         """Note how long after its time an algorithm returned."""
         at = algorithm, _magnitude(problem)
-        self._overrun[at] = max(_FORGETTING * self._overrun.get(at, 0.0), seconds)
+        self._overrun[at] = (self._overrun.get(at, seconds) + seconds) / 2
 
     def forget(self) -> None:
         """Begin anew: what was measured first had something to load."""
@@ -58,7 +61,7 @@ class AnswerTime:
 
     def way_back(self, problem: Problem) -> float:
         """Return the seconds from an explained plan to the client."""
-        return _FIXED_S + _WHOLE_WAY * max(self._writing, default=0.0) * _units(problem)
+        return _FIXED_S + _WHOLE_WAY * _median(self._writing) * _units(problem)
 
     def kept_back(self, problem: Problem, left_s: float) -> float:
         """Return the seconds before the end of the time limit at which the search should stop.
@@ -70,7 +73,7 @@ class AnswerTime:
         left_s
             Seconds until the limit; negative where it has passed.
         """
-        explaining = max(self._explaining, default=0.0) * _units(problem)
+        explaining = _median(self._explaining) * _units(problem)
         return self.way_back(problem) + max(0.0, min(_EXPLAINING_SHARE * left_s, explaining))
 
     def is_too_short(self, algorithm: str, problem: Problem, left_s: float) -> bool:
@@ -84,6 +87,10 @@ class AnswerTime:
             return False
         self._overrun[at] = _FORGETTING * expected
         return True
+
+
+def _median(seconds: Sequence[float]) -> float:
+    return median_high(seconds) if seconds else 0.0
 
 
 def _units(problem: Problem) -> float:

@@ -233,8 +233,10 @@ def _time_answers() -> None:
     """
     problem = _small_problem()
     planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    for each in (planned, *[_large_problem(_SIZE_TIMED)] * 2):
-        _answer_time.forget()
+    for each in (planned, _large_problem(_SIZE_TIMED)):
+        allocate_at_once(_request(each, "greedy", {}), _unlimited())
+    _answer_time.forget()
+    for _ in range(3):
         allocate_at_once(_request(each, "greedy", {}), _unlimited())
 
 
