@@ -31,6 +31,7 @@ bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_crash.py --quick
 	$(BIN)/python tests/benchmarks/bench_load.py --quick
 	$(BIN)/python tests/benchmarks/bench_mutations.py --quick
+	$(BIN)/python tests/benchmarks/bench_slow_senders.py
 	-$(BIN)/python tests/benchmarks/bench_overhead.py --quick
 	-$(BIN)/python tests/benchmarks/bench_lateness.py --quick
 
