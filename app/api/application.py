@@ -19,6 +19,7 @@ from app.api.access.keys import KeyStore
 from app.api.dashboard import install_dashboard
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
+from app.api.head_requests import HeadRequests
 from app.api.job_kinds import job_kinds
 from app.api.json_body import BodyLimit
 from app.api.metrics import Metrics
@@ -73,8 +74,8 @@ def create_application(settings: Settings) -> FastAPI:
             service = JobService(
                 database,
                 job_kinds(store, limits),
-                LocalExecutor(settings.workers, warm_up=_WARM_UP, log_level=settings.log_level),
-                reserve=LocalExecutor(1, warm_up=_WARM_UP_RESERVE, log_level=settings.log_level),
+                _executor(settings.workers, _WARM_UP, settings),
+                reserve=_executor(1, _WARM_UP_RESERVE, settings),
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
@@ -113,6 +114,12 @@ def create_application(settings: Settings) -> FastAPI:
     return application
 
 
+def _executor(slots: int, warm_up: str, settings: Settings) -> LocalExecutor:
+    """Make workers that are warm for the largest problems that are taken."""
+    largest = settings.max_uavs, settings.max_targets
+    return LocalExecutor(slots, warm_up=warm_up, warm_up_arguments=largest, log_level=settings.log_level)
+
+
 def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:
     """List the middleware, outermost first: what adds to every response stands before what refuses."""
     listed = [
@@ -132,4 +139,4 @@ def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:
         )
     if not settings.no_keys:
         listed.append(Middleware(Guard, always=settings.always_needs_keys))
-    return [*listed, Middleware(BodyLimit, limit=settings.max_body_bytes)]
+    return [*listed, Middleware(BodyLimit, limit=settings.max_body_bytes), Middleware(HeadRequests)]

@@ -109,7 +109,10 @@ def _methods_at(request: Request) -> list[str]:
     # A path that is spelled out is another place than those whose template it fits too.
     path = request.url.path
     templates = [path] if path in paths else [each for each in paths if compile_path(each)[0].match(path)]
-    return sorted({method.upper() for template in templates for method in paths[template]})
+    methods = {method.upper() for template in templates for method in paths[template]}
+    if "GET" in methods and not path.endswith("/events"):
+        methods.add("HEAD")
+    return sorted(methods)
 
 
 def _request_error(request: Request, error: Exception) -> Response:

@@ -54,9 +54,10 @@ class LocalExecutor:
     ----------
     slots
         How many workers there are.
-    warm_up
-        ``"module:function"``, called in every worker before it gets work; compiles and imports what the
-        first work would otherwise wait for. A worker whose warm-up raises is replaced after a pause.
+    warm_up, warm_up_arguments
+        ``"module:function"`` and its arguments, called in every worker before it gets work; compiles and
+        imports what the first work would otherwise wait for. A worker whose warm-up raises is replaced after
+        a pause.
     environment
         Variables of the workers, set before their process starts: the libraries read them as they load.
     log_level
@@ -68,13 +69,14 @@ class LocalExecutor:
         slots: int,
         *,
         warm_up: str | None = None,
+        warm_up_arguments: tuple[Any, ...] = (),
         environment: Mapping[str, str] = MappingProxyType(SINGLE_THREADED | KEEPS_MEMORY),
         log_level: str | None = None,
     ) -> None:
         if slots < 1:
             raise ValueError(f"slots is {slots}, but at least one worker is needed")
         self._slots = slots
-        self._warm_up = warm_up
+        self._warm_up = partial(worker.warm_up, warm_up, *warm_up_arguments)
         self._environment = dict(environment)
         self._log_level = log_level
         self._workers: set[_Worker] = set()
@@ -188,7 +190,7 @@ class _Worker:
         self._loop = asyncio.get_running_loop()
         self._reader = threading.Thread(target=self._read, name="worker-progress", daemon=True)
 
-    def start(self, warm_up: str | None, environment: Mapping[str, str]) -> None:
+    def start(self, warm_up: Callable[[], int], environment: Mapping[str, str]) -> None:
         """Start the process and wait until it is warm; blocks."""
         with _environment(environment):
             pid = self.pool.submit(os.getpid)
@@ -198,7 +200,7 @@ class _Worker:
         self.pid = pid.result()
         if self._doomed:
             self.kill()
-        self.pool.submit(worker.warm_up, warm_up).result()
+        self.pool.submit(warm_up).result()
 
     def begin(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
         """Route the progress of the work with this serial number."""

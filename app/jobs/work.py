@@ -31,14 +31,14 @@ _VERIFY = "app.learning.checkpoint:verify"
 _WARM_UP_TRANSFER = "app.learning.universal.warm_up:warm_up"
 
 _answer_time = AnswerTime()
-_SIZE_TIMED = (1000, 2000, 3)
-"""UAVs, areas and materials of the problem whose answer is timed by the warm-up: the largest by default."""
+_LARGEST_TRIED = (1000, 2000)
+"""UAVs and areas of the problem on which the warm-up tries how long answers take, at most."""
 
 _OVERRUNS_TIMED = {
-    "ga": _SIZE_TIMED, "local_search": _SIZE_TIMED, "auto": _SIZE_TIMED, "exact": _SIZE_TIMED,
-    "qmix": (100, 300, 3),
-}  # fmt: skip
-"""Algorithms whose preparations are timed by the warm-up, and at what size."""
+    **dict.fromkeys(("ga", "local_search", "auto", "exact"), _LARGEST_TRIED),
+    "qmix": (100, 300),
+}
+"""Algorithms whose preparations are timed by the warm-up, and at what size at most."""
 
 _ALONE = protocol.SolverContext()
 
@@ -194,8 +194,14 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
     return WorkResult({}, checkpoint)
 
 
-def warm_up() -> None:
-    """Load and compile what every kind of job needs, so that nobody waits for it later."""
+def warm_up(most_uavs: int = 50, most_targets: int = 100) -> None:
+    """Load and compile what every kind of job needs, so that nobody waits for it later.
+
+    Parameters
+    ----------
+    most_uavs, most_targets
+        Size of the largest problem that is to be expected; how long answers take is tried on it.
+    """
     problem = _small_problem()
     for algorithm, parameters in _WARM_UP_PARAMETERS.items():
         work = allocate(_request(problem, algorithm, parameters), _unlimited())
@@ -204,12 +210,10 @@ def warm_up() -> None:
     _named(_WARM_UP_TRANSFER)(problem)
     bounding.warm_up(problem)
     compile_problem(replace(problem, crs="wgs84"))
-    _time_answers()
-    for algorithm, size in _OVERRUNS_TIMED.items():
-        large, solver = (
-            _large_problem(size),
-            create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE),
-        )
+    _time_answers(most_uavs, most_targets)
+    for algorithm, most in _OVERRUNS_TIMED.items():
+        large = _large_problem(min(most_uavs, most[0]), min(most_targets, most[1]))
+        solver = create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE)
         for _ in range(2):
             begun = time.perf_counter()
             solver.solve(large, 0, lambda: True, lambda _progress: None)
@@ -217,15 +221,15 @@ def warm_up() -> None:
         _answer_time.overran(algorithm, large, overrun)
 
 
-def warm_up_at_once() -> None:
-    """Load and compile what :func:`allocate_at_once` needs."""
+def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
+    """Load and compile what :func:`allocate_at_once` needs; see :func:`warm_up`."""
     problem = _small_problem()
     allocate_at_once({**_request(problem, "greedy", {}), "bound_time_limit_s": 1.0}, _unlimited())
     compile_problem(replace(problem, crs="wgs84"))
-    _time_answers()
+    _time_answers(most_uavs, most_targets)
 
 
-def _time_answers() -> None:
+def _time_answers(most_uavs: int, most_targets: int) -> None:
     """Know how long answers take here before the first one is asked for in a short time.
 
     The problem is a large one, so that the memory is there too that such a one takes: the system may need
@@ -233,11 +237,12 @@ def _time_answers() -> None:
     """
     problem = _small_problem()
     planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    for each in (planned, _large_problem(_SIZE_TIMED)):
+    largest = _large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1]))
+    for each in (planned, largest):
         allocate_at_once(_request(each, "greedy", {}), _unlimited())
     _answer_time.forget()
     for _ in range(3):
-        allocate_at_once(_request(each, "greedy", {}), _unlimited())
+        allocate_at_once(_request(largest, "greedy", {}), _unlimited())
 
 
 def _small_problem() -> Problem:
@@ -250,8 +255,8 @@ def _small_problem() -> Problem:
     )
 
 
-def _large_problem(size: tuple[int, int, int]) -> Problem:
-    return generate("uniform", *size, np.random.default_rng(0))
+def _large_problem(n_uavs: int, n_targets: int) -> Problem:
+    return generate("uniform", n_uavs, n_targets, 3, np.random.default_rng(0))
 
 
 def _request(problem: Problem, algorithm: str, parameters: dict[str, Any]) -> dict[str, Any]:

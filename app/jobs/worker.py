@@ -136,10 +136,10 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
-def warm_up(hook: str | None) -> int:
+def warm_up(hook: str | None, *arguments: Any) -> int:
     """Run the hook that makes the first piece of work as quick as the later ones; return the process id."""
     if hook is not None:
-        resolve(hook)()
+        resolve(hook)(*arguments)
     # What is there now stays: to look through it for garbage would only hold up somebody's work.
     gc.collect()
     gc.freeze()

@@ -277,3 +277,20 @@ def test_method_not_allowed_says_what_is(client):
     assert client.put("/library").headers["allow"] == "GET, POST"
     assert client.put("/jobs/x").headers["allow"] == "DELETE, GET"
     assert set(client.delete("/docs").headers["allow"].split(", ")) == {"GET", "HEAD"}
+
+
+@pytest.mark.parametrize(
+    "path", ["/healthz", "/readyz", "/jobs?limit=1", "/metrics", "/", "/nowhere", "/jobs/x"]
+)
+def test_head_is_get_without_a_body(client, path):
+    head, get = client.head(path), client.get(path)
+
+    assert head.status_code == get.status_code
+    assert head.content == b""
+    assert head.headers["content-type"] == get.headers["content-type"]
+    assert head.headers["x-request-id"]
+
+
+def test_there_is_no_head_of_what_takes_a_body_or_goes_on(client):
+    assert client.head("/allocate").status_code == 405
+    assert client.head(f"/jobs/{'0' * 32}/events").status_code == 405
