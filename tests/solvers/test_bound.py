@@ -1,5 +1,6 @@
 """Bounds against the best there is: by brute force, under both unloading rules, whenever they are stopped."""
 
+import highspy
 import numpy as np
 import pytest
 from brute_force import best_reward
@@ -52,6 +53,21 @@ def test_it_is_the_best_that_planned_unloading_reaches(seed):
         assert bound.tight
         assert bound.value >= best - 1e-12 * abs(best)
         assert bound.value == pytest.approx(best, abs=1e-6, rel=1e-6)
+
+
+def test_another_user_of_the_solver_in_the_process_does_not_loosen_it():
+    # HiGHS has one set of threads a process; whoever runs first decides how many, and others got an error.
+    problem = generate("uniform", 3, 3, 2, np.random.default_rng(5))
+    alone = upper_bound(problem, None, never)
+    highspy.Highs.resetGlobalScheduler(True)
+    other = highspy.Highs()
+    other.setOptionValue("output_flag", False)
+    other.setOptionValue("threads", 2)
+    other.addVar(0.0, 1.0)
+    other.run()
+    after = upper_bound(problem, None, never)
+    assert after == alone
+    assert after.tight
 
 
 def test_the_bound_for_large_problems_holds_for_small_ones():

@@ -103,9 +103,15 @@ class Master:
         upper = np.where(allowed, highspy.kHighsInf, 0.0)
         self._program.changeColsBounds(count, np.arange(count, dtype=np.int32), np.zeros(count), upper)
 
+    def _run(self) -> None:
+        """Run HiGHS. Its threads are the process's: another user of it may have begun with more of them."""
+        if self._program.run() == highspy.HighsStatus.kError:
+            highspy.Highs.resetGlobalScheduler(True)
+            self._program.run()
+
     def solve(self) -> MasterSolution | None:
         """Solve; None where the columns allow no route to some UAV, or HiGHS finds no optimum."""
-        self._program.run()
+        self._run()
         if self._program.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
         solution = self._program.getSolution()

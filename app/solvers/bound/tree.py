@@ -77,6 +77,8 @@ class Tree:
     ----------
     lower
         The best that is known to be possible.
+    attained
+        Whether ``lower`` is known to be reached; False once a node ended without a solution.
     nodes
         Nodes looked at.
     """
@@ -86,6 +88,7 @@ class Tree:
     ) -> None:
         self.relaxation = Relaxation(instance, sets)
         self.lower = lower
+        self.attained = True
         self.nodes = 0
         self._closing = closing
         self._made = 0
@@ -136,8 +139,8 @@ class Tree:
     def _branch(self, node: Node, visits: Floats | None) -> None:
         i, bit = self._question(node.pools, visits)
         if i < 0:
-            # Every UAV has one set left: nothing to ask, so the bound stays as it is.
-            self.lower = max(self.lower, node.bound)
+            # Every UAV has one set left: nothing to ask, so the bound stays as it is, reached or not.
+            self.lower, self.attained = max(self.lower, node.bound), False
             return
         has = (self.relaxation.sets[i].mask[node.pools.sets[i]] >> bit) & 1 == 1
         for answer in (True, False):

@@ -57,7 +57,7 @@ def upper_bound(problem: Problem, reward: float | None, stop: StopCriterion) -> 
         return UpperBound(value * instance.scale, value <= lower)
     tree = Tree(instance, sets, lower)
     tree.run(stop)
-    return UpperBound(tree.bound * instance.scale, tree.proven)
+    return UpperBound(tree.bound * instance.scale, tree.proven and tree.attained)
 
 
 def enumerate_sets(instance: Instance, stop: StopCriterion) -> tuple[TargetSets, ...] | None:
