@@ -74,7 +74,9 @@ class LiveService:
             except httpx.TransportError:
                 assert self._process is not None
                 assert self._process.poll() is None, self.log.read_text()[-2000:]
-            assert time.monotonic() < end, f"{path} did not say yes"
+            if time.monotonic() > end:
+                self.kill_all()
+                raise AssertionError(f"{path} did not say yes within {_READY_WITHIN_S:g} s")
             threading.Event().wait(0.05)
 
     def workers(self) -> list[int]:
