@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+import time
 from collections import Counter
 from itertools import count
 from typing import Any
@@ -17,6 +18,9 @@ NAMES_FIELDS = frozenset({"invalid-request", "invalid-problem", "invalid-paramet
 
 _TIMEOUT_S = 60.0
 _LARGE_BYTES = 8 * 1024**2
+
+_IDLE_S = 2.0
+"""After so long without a request a new connection is made: the server closes idle ones after 5 s."""
 
 
 class MutationTrial:
@@ -48,10 +52,12 @@ class MutationTrial:
             thread.join()
 
     def _send(self, share: int) -> None:
-        connection = http.client.HTTPConnection(*self._at, timeout=_TIMEOUT_S)
+        connection, used = http.client.HTTPConnection(*self._at, timeout=_TIMEOUT_S), time.monotonic()
         for _ in range(share):
             number = next(self._numbers)
             sent = mutant(self._seed, number, self._paths, self._sound)
+            if time.monotonic() - used > _IDLE_S:
+                connection.close()
             try:
                 status, kind, fault = _exchange(connection, sent)
             except (OSError, http.client.HTTPException) as error:
@@ -59,6 +65,7 @@ class MutationTrial:
                 # Who is refused while it still sends may find its connection closed.
                 status, kind = "closed", ""
                 fault = None if len(sent.body) > _LARGE_BYTES else f"{type(error).__name__}: {error}"
+            used = time.monotonic()
             with self._lock:
                 self.answers[f"{sent.path} {status} {kind}".strip()] += 1
                 if fault:
