@@ -1,7 +1,7 @@
 /** One allocation at a time: sent as a job, followed by its events, cancelled with its best plan kept. */
 
 import { ApiError, follow, json } from "./api.js";
-import { notify } from "./dom.js";
+import { forgetErrors, notify } from "./dom.js";
 import { get, set } from "./state.js";
 
 /** The request for the problem on screen. An objective that is the API's default is left out. */
@@ -15,17 +15,20 @@ export function requestOf(problem, how) {
  */
 export async function allocate(how) {
   const { problem } = get();
+  forgetErrors();
   set({ violations: [], answer: null, answerProblem: null, incumbent: null, job: { id: null, status: "sending", algorithm: how.algorithm, fraction: 0, epoch: null, best_reward: null, trace: [], startedAt: performance.now() } });
   try {
     const job = await json("allocate", { method: "POST", body: requestOf(problem, how), headers: { Prefer: "respond-async" } });
     take({ id: job.id, status: job.status });
-    await follow(job.id, (_, progress) => onProgress(problem, progress));
-    end(problem, await json(`jobs/${job.id}`));
+    end(problem, await follow(job.id, (progress) => onProgress(problem, progress), () => take({ status: "reconnecting" })));
   } catch (error) {
-    take({ status: "failed" });
+    if (!(error instanceof ApiError)) console.error(error);
+    const wait = error.retryAfter ? ` Try again in ${error.retryAfter} s.` : "";
+    const why = `${error.message}.${wait}`.replace("..", ".");
+    take({ status: "failed", error: why });
     set({ incumbent: null, violations: error.violations ?? [] });
-    const wait = error instanceof ApiError && error.retryAfter ? ` Try again in ${error.retryAfter} s.` : "";
-    notify(`${error.message}.${wait}`.replace("..", "."), "error");
+    // The allocate view says it itself.
+    if (get().view !== "allocate") notify(why, "error");
   }
 }
 
@@ -43,7 +46,7 @@ export async function cancel() {
 
 /** Whether a job is under way. */
 export function running(job) {
-  return job !== null && ["sending", "queued", "running", "stopping"].includes(job.status);
+  return job !== null && ["sending", "queued", "running", "reconnecting", "stopping"].includes(job.status);
 }
 
 function take(fields) {
@@ -52,7 +55,7 @@ function take(fields) {
 
 function onProgress(problem, progress) {
   const { job, incumbent } = get();
-  const { fraction, epoch, best_reward, assignment } = progress;
+  const { fraction, epoch = null, best_reward = null, assignment } = progress;
   const rose = best_reward !== null && best_reward !== job.trace.at(-1)?.reward;
   const point = { t: (performance.now() - job.startedAt) / 1000, epoch, reward: best_reward };
   const status = job.status === "stopping" ? "stopping" : (progress.status ?? "running");
@@ -63,8 +66,8 @@ function onProgress(problem, progress) {
 function end(problem, job) {
   const { trace, startedAt } = get().job;
   const last = { t: (performance.now() - startedAt) / 1000, epoch: job.progress.epoch, reward: job.result?.reward ?? null };
-  take({ status: job.status, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
+  take({ status: job.status, error: job.error?.detail, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
   set({ incumbent: null, answer: job.result, answerProblem: job.result && problem, violations: job.error?.errors ?? [] });
-  if (job.error) notify(job.error.detail, "error");
-  else if (!job.result) notify("The job was cancelled before it had a plan");
+  if (job.error && get().view !== "allocate") notify(job.error.detail, "error");
+  if (!job.error && !job.result) notify("The job was cancelled before it had a plan");
 }

@@ -2,9 +2,15 @@
 
 const KEY = "allocator-key";
 const RETRY_MS = 1000;
+/** What a service answers that will be back: too busy, starting, or behind a gateway that does not reach it. */
+const PASSING = new Set([0, 429, 502, 503, 504]);
 let askForKey = async () => null;
+let asking = null;
 
-/** An answer that is no success; `problem` is its problem details, `violations` its errors field by field. */
+/**
+ * An answer that is no success; `problem` is its problem details, `violations` its errors field by field.
+ * Its status is 0 where the service could not be reached.
+ */
 export class ApiError extends Error {
   constructor(status, problem, retryAfter = null) {
     super(problem.detail ?? `the service answered ${status}`);
@@ -15,7 +21,7 @@ export class ApiError extends Error {
   }
 }
 
-/** Say how a key is asked for: a function that resolves to the key, or null. */
+/** Say how a key is asked for: a function that is told why another is needed, or null, and resolves to the key, or null. */
 export function onKeyNeeded(ask) {
   askForKey = ask;
 }
@@ -26,22 +32,27 @@ export function useKey(key) {
   else sessionStorage.removeItem(KEY);
 }
 
+/** Whether there is a key. */
+export function hasKey() {
+  return sessionStorage.getItem(KEY) !== null;
+}
+
 /** The address of a path of the API, whatever prefix the service stands behind. */
 export function address(path) {
   return new URL(path.replace(/^\//, ""), document.baseURI).href;
 }
 
 /**
- * Send a request; a 401 asks for a key once and tries again.
+ * Send a request; a 401 asks for a key and tries again, until one is right or none is given.
  * @param {string} path
  * @param {{method?: string, body?: any, headers?: object, signal?: AbortSignal}} [options] body is sent as JSON
  * @returns {Promise<Response>} of a status below 400
  * @throws {ApiError}
  */
 export async function send(path, { method = "GET", body, headers = {}, signal } = {}) {
-  for (let asked = false; ; asked = true) {
+  for (;;) {
     const key = sessionStorage.getItem(KEY);
-    const response = await fetch(address(path), {
+    const response = await reached(path, {
       method,
       signal,
       headers: {
@@ -53,15 +64,27 @@ export async function send(path, { method = "GET", body, headers = {}, signal } 
     });
     if (response.ok || response.status === 304) return response;
     const problem = await response.json().catch(() => ({}));
-    if (response.status === 401 && !asked) {
-      const given = await askForKey(problem.detail);
-      if (given) {
-        useKey(given);
-        continue;
-      }
-    }
+    if (response.status === 401 && (await otherKey(key, problem.detail))) continue;
     throw new ApiError(response.status, problem, response.headers.get("Retry-After"));
   }
+}
+
+async function reached(path, options) {
+  try {
+    return await fetch(address(path), options);
+  } catch (error) {
+    if (options.signal?.aborted) throw error;
+    throw new ApiError(0, { detail: "The service cannot be reached" });
+  }
+}
+
+/** Whether there is another key than the one refused; requests that need one at the same time share the question. */
+async function otherKey(refused, why) {
+  if (sessionStorage.getItem(KEY) !== refused) return true;
+  asking ??= askForKey(refused === null ? null : why).finally(() => { asking = null; });
+  const given = await asking;
+  if (given) useKey(given);
+  return Boolean(given);
 }
 
 /** Like send, with the answer's JSON. */
@@ -81,24 +104,32 @@ export async function changed(path, etag) {
 }
 
 /**
- * Follow a job's events to its end, going on after the last one seen where the connection breaks.
+ * Follow a job's events to its end, going on after the last one seen where the connection breaks or the service is
+ * started again, and read the job.
  * @param {string} id of the job
- * @param {(name: string, data: object) => void} listen
- * @param {AbortSignal} [signal]
+ * @param {(data: object) => void} listen
+ * @param {() => void} [lost] called each time the service is not there
+ * @returns {Promise<object>} the job at its end
  */
-export async function follow(id, listen, signal) {
+export async function follow(id, listen, lost = () => {}) {
   let last = null;
-  for (;;) {
+  for (let ended = false; ; ) {
     try {
-      const response = await send(`jobs/${id}/events`, { signal, headers: last ? { "Last-Event-ID": last } : {} });
+      if (ended) return await json(`jobs/${id}`);
+      const response = await send(`jobs/${id}/events`, { headers: last ? { "Last-Event-ID": last } : {} });
       for await (const event of events(response.body)) {
         last = event.id ?? last;
-        if (event.data) listen(event.name, JSON.parse(event.data));
-        if (event.name === "end") return;
+        if (event.data) listen(JSON.parse(event.data));
+        if (event.name === "end") {
+          ended = true;
+          break;
+        }
       }
+      if (ended) continue;
     } catch (error) {
-      if (signal?.aborted || error instanceof ApiError) throw error;
+      if (error instanceof ApiError && !PASSING.has(error.status)) throw error;
     }
+    lost();
     await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
 }

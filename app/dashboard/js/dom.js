@@ -32,22 +32,51 @@ export function svg(tag, attributes = {}, ...children) {
 
 /** A number for people, with the exact one in it: `<data value="…">`. */
 export function number(value, digits = 4) {
-  return h("data", { value: String(value), title: String(value) }, shown(value, digits));
+  const exact = Number.isFinite(value) ? String(value) : null;
+  return h("data", { value: exact, title: exact }, shown(value, digits));
 }
 
 /** A number in at most so many significant digits, whole numbers in full. */
 export function shown(value, digits = 4) {
-  if (value === null || value === undefined) return "–";
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (Number.isInteger(value)) return String(value);
   const text = Number(value.toPrecision(Math.max(digits, Math.floor(Math.log10(Math.abs(value))) + 1)));
   return String(text).replace("-", "−");
 }
 
-/** Tell something at the page's edge; it goes after a while. @param {"info"|"error"} tone */
+const MANY_KINDS = 8;
+
+/** Amounts in a line, exact ones in them; of many kinds those that are not zero, each with its kind's number. */
+export function amounts(list) {
+  if (list.length <= MANY_KINDS) return list.flatMap((amount, k) => [k ? ", " : null, number(amount)]);
+  const some = list.map((amount, k) => [amount, k]).filter(([amount]) => amount);
+  if (!some.length) return ["nothing"];
+  const each = some.flatMap(([amount, k], n) => [n ? ", " : null, number(amount), h("span", { class: "hint" }, ` of kind ${k + 1}`)]);
+  return some.length <= MANY_KINDS ? each : [h("details", {}, h("summary", {}, `${some.length} kinds`), each)];
+}
+
+/** The same as a text, and no more than the first of many kinds. */
+export function shortAmounts(list, between = ", ") {
+  if (list.length <= MANY_KINDS) return list.map((amount) => shown(amount)).join(between);
+  const some = list.flatMap((amount, k) => (amount ? [`${shown(amount)} of kind ${k + 1}`] : []));
+  if (!some.length) return "nothing";
+  return some.slice(0, 3).join(between) + (some.length > 3 ? ` and ${some.length - 3} more kinds` : "");
+}
+
+/** Take what was told of errors off the page: something new is tried. */
+export function forgetErrors() {
+  document.getElementById("alerts").replaceChildren();
+}
+
+/** Tell something at the page's edge; it goes after a while, or when it is closed. @param {"info"|"error"} tone */
 export function notify(text, tone = "info") {
-  const notice = h("p", { class: `notice ${tone}`, role: tone === "error" ? "alert" : null }, text);
-  document.getElementById("notices").append(notice);
-  setTimeout(() => notice.remove(), tone === "error" ? 10_000 : 4_000);
+  const place = document.getElementById(tone === "error" ? "alerts" : "news");
+  for (const same of [...place.children]) if (same.dataset.text === text) same.remove();
+  const close = h("button", { type: "button", class: "quiet", "aria-label": "Close this message", onclick: () => notice.remove() }, "×");
+  const notice = h("div", { class: `notice ${tone}`, dataset: { text } }, h("p", {}, text), close);
+  place.append(notice);
+  const end = () => (notice.matches(":hover, :focus-within") ? setTimeout(end, 2_000) : notice.remove());
+  setTimeout(end, tone === "error" ? 12_000 : 5_000);
 }
 
 /** Hand a text or blob to the user as a file. */

@@ -25,9 +25,9 @@ export class Fields {
 
 /** Show refusals at the fields of a form; return those that belong to none of them. */
 export function showViolations(root, violations) {
-  for (const place of root.querySelectorAll("[data-pointer]")) setError(place, null);
+  for (const place of root.querySelectorAll("label[data-pointer]")) setError(place, null);
   return violations.filter(({ pointer, detail }) => {
-    const place = root.querySelector(`[data-pointer="${CSS.escape(pointer)}"]`);
+    const place = root.querySelector(`label[data-pointer="${CSS.escape(pointer)}"]`);
     if (place) setError(place, detail);
     return !place;
   });
@@ -61,8 +61,13 @@ function makeField(name, schema, pointer, value, onchange) {
   const input = inputFor(schema, given);
   input.name = name;
   input.addEventListener("change", onchange);
-  const element = labelled(titleOf(name), input, { pointer, hint: [schema.description, range(schema)].filter(Boolean).join(". ") });
+  const element = labelled(titleOf(name), input, { pointer, hint: [forPeople(schema.description), range(schema)].filter(Boolean).join(". ") });
   return { name, element, read: () => valueOf(schema, input) };
+}
+
+/** A description in the API's words, where a field that is left empty is null. */
+function forPeople(description) {
+  return description?.replaceAll("null:", "empty:").replaceAll("`", "");
 }
 
 /** A parameter's name for people: `time_limit_s` is “Time limit, s”. */

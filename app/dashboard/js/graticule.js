@@ -47,7 +47,7 @@ export const Graticule = Layer.extend({
 
   _line(line, label, value) {
     const text = svg("text", label);
-    text.textContent = shown(value, 6) + this._degrees;
+    text.textContent = shown(this._degrees && value > 180 ? value - 360 : value, 6) + this._degrees;
     this._drawn.append(svg("line", line), text);
   },
 });

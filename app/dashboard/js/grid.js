@@ -2,6 +2,10 @@
 
 import { h, shown } from "./dom.js";
 
+/** With more rows than this only those near the ones in sight are there. */
+const WINDOW = 240;
+const MARGIN = 60;
+
 /** A table of UAVs or areas, a row each. */
 export class Grid {
   /**
@@ -16,6 +20,9 @@ export class Grid {
     this.head = h("tr", { role: "row" });
     this.body = h("tbody", { role: "rowgroup" });
     this.element = h("table", { role: "grid", "aria-label": options.label, class: "grid", dataset: { kind: options.kind } }, h("thead", { role: "rowgroup" }, this.head), this.body);
+    this.from = 0;
+    this.marked = { selected: null, faults: new Map() };
+    document.addEventListener("scroll", ({ target }) => this.#onScroll(target), { capture: true, passive: true });
     this.body.addEventListener("click", (event) => this.#onClick(event));
     this.body.addEventListener("dblclick", (event) => this.#edit(event.target.closest("td")));
     this.body.addEventListener("keydown", (event) => this.#onKey(event));
@@ -27,28 +34,75 @@ export class Grid {
    * @param {{name: string, title: string, read: (item: object) => any, optional?: boolean}[]} columns
    */
   show(items, columns) {
-    const sameColumns = columns.map((c) => c.name).join() === this.columns.map((c) => c.name).join();
+    const sameColumns = columns.map((c) => c.title).join() === this.columns.map((c) => c.title).join();
     if (!sameColumns) {
       this.rows.clear();
-      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "hint" }, "")));
+      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "visually-hidden" }, "Delete")));
     }
     this.columns = columns;
+    const active = document.activeElement?.closest?.("table") === this.element ? document.activeElement.closest("td") : null;
+    const had = active && this.#place(active);
     this.items = items;
-    const kept = new Map();
-    for (const item of items) {
-      const known = this.rows.get(item.id);
-      kept.set(item.id, known?.item === item ? known : { item, element: this.#row(item) });
-    }
-    const had = document.activeElement?.closest?.("table") === this.element ? this.#place(document.activeElement.closest("td")) : null;
-    this.rows = kept;
-    this.body.replaceChildren(...[...kept.values()].map(({ element }) => element));
-    const first = this.body.querySelector("td");
-    if (first && !this.body.querySelector('td[tabindex="0"]')) first.tabIndex = 0;
+    this.element.setAttribute("aria-rowcount", String(items.length + 1));
+    this.#fill(this.from);
     if (had) this.focus(Math.min(had.row, items.length - 1), had.column);
+  }
+
+  /** Make the rows from one on, and keep the room of all others. */
+  #fill(from) {
+    const all = this.items.length <= WINDOW;
+    this.from = all ? 0 : Math.max(0, Math.min(from, this.items.length - WINDOW));
+    const shown = all ? this.items : this.items.slice(this.from, this.from + WINDOW);
+    const kept = new Map();
+    for (const [at, item] of shown.entries()) {
+      const known = this.rows.get(item.id);
+      const row = known?.item === item ? known : { item, element: this.#row(item) };
+      row.element.setAttribute("aria-rowindex", String(this.from + at + 2));
+      kept.set(item.id, row);
+    }
+    this.rows = kept;
+    const room = (count) => {
+      if (!count) return [];
+      const made = h("tr", { class: "room", role: "presentation" }, h("td", { role: "presentation", colspan: String(this.columns.length + 1) }));
+      made.firstChild.style.height = `${count * this.#height()}px`;
+      return [made];
+    };
+    this.body.replaceChildren(...room(this.from), ...[...kept.values()].map(({ element }) => element), ...room(this.items.length - this.from - shown.length));
+    this.#mark();
+    const first = this.body.querySelector("td[data-column]");
+    if (first && !this.body.querySelector('td[tabindex="0"]')) first.tabIndex = 0;
+  }
+
+  /** Of a row, in pixels. */
+  #height() {
+    for (const { element } of this.rows.values()) if (element.offsetHeight) this.height = element.getBoundingClientRect().height;
+    return this.height ?? 28;
+  }
+
+  #onScroll(scroller) {
+    if (this.items.length <= WINDOW || this.element.hidden || !scroller.contains?.(this.element)) return;
+    const height = this.#height();
+    const top = Math.floor((scroller.getBoundingClientRect().top - this.body.getBoundingClientRect().top) / height);
+    const end = top + Math.ceil(scroller.clientHeight / height);
+    const missing = (top < this.from && this.from > 0) || (end > this.from + WINDOW && this.from + WINDOW < this.items.length);
+    if (missing && !this.body.contains(document.activeElement?.closest("input"))) this.#fill(top - MARGIN);
+  }
+
+  /** The row of an item, made where it was not there. */
+  #rowAt(at) {
+    if (at < 0 || at >= this.items.length) return null;
+    if (at < this.from || at >= this.from + WINDOW) this.#fill(at - WINDOW / 2);
+    return this.rows.get(this.items[at].id)?.element ?? null;
   }
 
   /** Mark the selected row and the cells that the service refuses. @param {Map<string, string>} faults by `row/column` */
   mark(selected, faults = new Map()) {
+    this.marked = { selected, faults };
+    this.#mark();
+  }
+
+  #mark() {
+    const { selected, faults } = this.marked;
     for (const [id, { element }] of this.rows) element.setAttribute("aria-selected", String(id === selected));
     for (const cell of this.body.querySelectorAll("[aria-invalid]")) {
       cell.removeAttribute("aria-invalid");
@@ -57,7 +111,7 @@ export class Grid {
     for (const [key, detail] of faults) {
       const cut = key.indexOf("/");
       const [row, name] = [key.slice(0, cut), key.slice(cut + 1)];
-      const cell = this.body.rows[Number(row)]?.querySelector(`td[data-column="${CSS.escape(name)}"]`);
+      const cell = this.rows.get(this.items[Number(row)]?.id)?.element.querySelector(`td[data-column="${CSS.escape(name)}"]`);
       cell?.setAttribute("aria-invalid", "true");
       if (cell) cell.title = detail;
     }
@@ -65,7 +119,7 @@ export class Grid {
 
   /** Go to a cell. */
   focus(row, column) {
-    const cell = this.body.rows[row]?.cells[column];
+    const cell = this.#rowAt(row)?.cells[column];
     if (!cell) return;
     for (const other of this.body.querySelectorAll('td[tabindex="0"]')) other.tabIndex = -1;
     cell.tabIndex = 0;
@@ -75,7 +129,7 @@ export class Grid {
 
   /** Bring a row into sight. */
   reveal(id) {
-    this.rows.get(id)?.element.scrollIntoView({ block: "nearest" });
+    this.#rowAt(this.items.findIndex((item) => item.id === id))?.scrollIntoView({ block: "nearest" });
   }
 
   #row(item) {
@@ -88,12 +142,12 @@ export class Grid {
   }
 
   #place(cell) {
-    return { row: cell.parentElement.sectionRowIndex, column: cell.cellIndex };
+    return { row: Number(cell.parentElement.getAttribute("aria-rowindex")) - 2, column: cell.cellIndex };
   }
 
   #onClick(event) {
     const row = event.target.closest("tr");
-    if (!row) return;
+    if (!row?.dataset.id) return;
     if (event.target.closest("button")) this.options.onDelete(row.dataset.id);
     else this.options.onSelect(row.dataset.id);
   }

@@ -1,6 +1,6 @@
 /** Start of the page: the service's facts, the tabs, the keyboard, the key dialog. */
 
-import { json, onKeyNeeded, send, useKey } from "./api.js";
+import { hasKey, json, onKeyNeeded, send, useKey } from "./api.js";
 import { h, notify } from "./dom.js";
 import { DispatchMap } from "./map.js";
 import { open, redo, undo } from "./problem.js";
@@ -12,6 +12,7 @@ const FIRST_EXAMPLE = "cyclone-idai";
 const LOOK_AGAIN_MS = 10_000;
 const byId = (id) => document.getElementById(id);
 let map;
+let missing = false; // what the service offers is not known, as it could not be asked
 
 /** Show a view, mounting it the first time. */
 function show(id) {
@@ -75,17 +76,45 @@ function makeTabs() {
   });
 }
 
-function askForKey(why) {
+/** Ask for a key. @param {string | null} why the one before was refused; null: there was none */
+function askForKey(why = null) {
   const dialog = byId("key-dialog");
-  byId("key-input").value = "";
-  byId("key-input").title = why ?? "";
+  const input = byId("key-input");
+  input.value = "";
+  byId("key-why").textContent = why ? `${why[0].toUpperCase()}${why.slice(1)}.` : "";
+  byId("key-why").hidden = !why;
+  byId("key-forget").hidden = !hasKey();
+  dialog.returnValue = "";
   if (!dialog.open) dialog.showModal();
+  input.focus();
   return new Promise((resolve) => {
-    dialog.addEventListener("close", () => resolve(dialog.returnValue === "use" ? byId("key-input").value.trim() : null), { once: true });
+    dialog.addEventListener("close", () => {
+      const given = dialog.returnValue === "use" ? input.value.trim() : null;
+      input.value = "";
+      resolve(given);
+    }, { once: true });
+  });
+}
+
+function makeKeyDialog() {
+  const dialog = byId("key-dialog");
+  onKeyNeeded(askForKey);
+  byId("key-cancel").addEventListener("click", () => dialog.close());
+  byId("key-forget").addEventListener("click", () => {
+    useKey(null);
+    dialog.close();
+    notify("The key is forgotten.");
+  });
+  byId("key").addEventListener("click", async () => {
+    const key = await askForKey();
+    if (!key) return;
+    useKey(key);
+    if (!get().algorithms.length) await load();
   });
 }
 
 function onKeys(event) {
+  if (document.querySelector("dialog[open]")) return;
   const typing = event.target.closest("input, textarea, select");
   const command = event.ctrlKey || event.metaKey;
   if (command && event.key.toLowerCase() === "z" && !typing) {
@@ -94,22 +123,25 @@ function onKeys(event) {
   } else if (command && event.key === "Enter") {
     set({ view: "allocate" });
     byId("allocate-form")?.requestSubmit();
-  } else if (event.key === "Escape" && !typing && !document.querySelector("dialog[open]")) {
+  } else if (event.key === "Escape" && !typing) {
     map.stopPlacing();
     set({ selection: null });
   }
 }
 
 async function watchService() {
-  const shown = byId("service");
+  const tell = (state, text) => {
+    const shown = byId("service");
+    shown.className = `service ${state}`;
+    if (shown.textContent !== text) shown.textContent = text;
+  };
   try {
     await send("readyz");
-    shown.className = "service up";
-    shown.textContent = "Ready";
+    tell("up", "Ready");
   } catch (error) {
-    shown.className = "service down";
-    shown.textContent = error.status ? "Not ready" : "Not reachable";
+    tell("down", error.status ? "Not ready" : "Not reachable");
   }
+  if (missing) await load();
   setTimeout(watchService, LOOK_AGAIN_MS);
 }
 
@@ -118,26 +150,33 @@ function titleProblem({ problem, problemName }) {
   byId("problem-title").textContent = problem ? `${problemName} · ${sizes}` : "";
 }
 
+/** Learn what the service offers, and open an example where nothing was made yet. */
+async function load() {
+  try {
+    const { algorithms } = await json("algorithms");
+    missing = false;
+    set({ algorithms });
+    const { problem, past } = get();
+    if (!problem || !(past.length || problem.uavs.length || problem.targets.length)) {
+      open(await json(`examples/${FIRST_EXAMPLE}`), FIRST_EXAMPLE);
+    }
+  } catch (error) {
+    missing = error.status === 0 || error.status >= 500;
+    if (!missing) notify(error.message, "error");
+  }
+}
+
 async function start() {
-  onKeyNeeded(askForKey);
-  byId("key").addEventListener("click", async () => {
-    const key = await askForKey();
-    if (key !== null) useKey(key);
-  });
+  makeKeyDialog();
   document.addEventListener("keydown", onKeys);
   subscribe(["problem", "problemName"], titleProblem);
   set({ settings: await json("dashboard/settings.json") });
   map = new DispatchMap(byId("map"));
   makeTabs();
   subscribe(["view"], ({ view }) => show(view));
+  await load();
+  if (!get().problem) open({}, "New problem");
   watchService();
-  try {
-    set({ algorithms: (await json("algorithms")).algorithms });
-    open(await json(`examples/${FIRST_EXAMPLE}`), FIRST_EXAMPLE);
-  } catch (error) {
-    notify(error.message, "error");
-    open({}, "New problem");
-  }
   show(get().view);
   document.documentElement.dataset.ready = "true";
 }

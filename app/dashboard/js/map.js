@@ -2,16 +2,27 @@
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { Graticule } from "./graticule.js";
-import { shown } from "./dom.js";
-import { hue, met, rangeLeft, routesOf, stateOf, sum } from "./plan.js";
+import { shortAmounts, shown } from "./dom.js";
+import { hue, met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
 import { extent, move, place, position, remove } from "./problem.js";
 import { get, select, subscribe } from "./state.js";
-import { areaSymbol, aside, uavSymbol } from "./symbols.js";
+import { areaDot, areaSymbol, aside, uavDot, uavSymbol } from "./symbols.js";
+
+const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 
 const MANY = 150;
+const DOTS_FROM = 600;
+const SLOW_MS = 250;
 const FEW_STOPS = 80;
 const NUDGE_PX = 5;
 const NUDGES = { ArrowUp: [0, -NUDGE_PX], ArrowDown: [0, NUDGE_PX], ArrowLeft: [-NUDGE_PX, 0], ArrowRight: [NUDGE_PX, 0] };
+
+/** What stands beside a symbol or route, as text. */
+function tip(text) {
+  const made = document.createElement("span");
+  made.textContent = text;
+  return made;
+}
 
 /** A Leaflet map that follows the store. */
 export class DispatchMap {
@@ -24,8 +35,10 @@ export class DispatchMap {
     this.fitting = false;
     this.placing = null;
     this.symbols = new Map();
+    this.later = null;
+    this.shift = 0;
     subscribe(["problem"], ({ problem }) => this.#onProblem(problem));
-    subscribe(["answer", "incumbent", "answerProblem"], () => this.#draw());
+    subscribe(["answer", "incumbent", "answerProblem"], (_, changed) => (changed.includes("answer") ? this.#draw() : this.#drawSoon()));
     subscribe(["selection"], () => this.#markSelection());
     element.addEventListener("keydown", (event) => this.#onKey(event));
   }
@@ -36,7 +49,7 @@ export class DispatchMap {
     this.#onProblem(problem ?? get().problem);
   }
 
-  /** The next click places one. @param {"uavs"|"targets"} kind @param {() => void} [ended] */
+  /** The next click, or Enter on the map for its middle, places one. @param {"uavs"|"targets"} kind @param {() => void} [ended] */
   startPlacing(kind, ended = () => {}) {
     this.stopPlacing();
     this.placing = { kind, ended };
@@ -53,8 +66,25 @@ export class DispatchMap {
   fit() {
     this.handled = false;
     this.fitting = true;
-    this.#fitBox(extent(this.#shown().problem));
+    this.#fitBox(this.#extent(this.#shown().problem));
     this.fitting = false;
+  }
+
+  /** The box of all positions as they are drawn; around the globe the narrowest, so that it may pass the date line. */
+  #extent(problem) {
+    const box = extent(problem);
+    this.shift = 0;
+    if (!box || problem.crs !== "wgs84" || box.maxX - box.minX <= 180) return box;
+    const east = [...problem.uavs.flatMap((uav) => [uav.x_s, position(uav).x]), ...problem.targets.map(({ x }) => x)].map((x) => (x < 0 ? x + 360 : x));
+    const [minX, maxX] = [Math.min(...east), Math.max(...east)];
+    if (maxX - minX >= box.maxX - box.minX) return box;
+    this.shift = 360;
+    return { ...box, minX, maxX };
+  }
+
+  /** Where a position is drawn. */
+  #latLng({ x, y }) {
+    return [y, x < 0 ? x + this.shift : x];
   }
 
   #fitBox(box) {
@@ -89,6 +119,7 @@ export class DispatchMap {
     this.map = L.map(this.element, {
       crs: globe ? L.CRS.EPSG3857 : L.CRS.Simple,
       minZoom: globe ? 1 : -32, maxZoom: globe ? 20 : 32, zoomSnap: 0.25, zoomDelta: 0.5,
+      zoomAnimation: !CALM.matches, markerZoomAnimation: !CALM.matches, inertia: !CALM.matches,
       attributionControl: Boolean(globe && settings.tile_url), fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
     });
     this.map.attributionControl?.setPrefix(false);
@@ -103,13 +134,14 @@ export class DispatchMap {
     this.renderer = L.svg({ padding: 0.5, pane: "routes" });
     this.routes = L.layerGroup().addTo(this.map);
     this.markers = L.layerGroup().addTo(this.map);
+    this.symbols.clear();
     this.map.on("movestart zoomstart", () => { this.handled ||= !this.fitting; });
     this.map.on("click", ({ latlng }) => this.#onClick(latlng));
   }
 
   #onProblem(problem) {
     if (!problem) return;
-    const box = extent(problem);
+    const box = this.#extent(problem);
     const remade = !this.map || this.crs !== problem.crs;
     if (remade) this.#make(problem.crs);
     const far = box && this.map._loaded && !this.map.getBounds().intersects([[box.minY, box.minX], [box.maxY, box.maxX]]);
@@ -120,14 +152,30 @@ export class DispatchMap {
   #draw() {
     const { problem, plan, planned = problem } = this.#shown();
     if (!this.map || !problem) return;
-    this.routes.clearLayers();
-    this.markers.clearLayers();
-    this.symbols.clear();
-    if (plan) this.#drawRoutes(planned, plan);
+    clearTimeout(this.later);
+    this.later = null;
+    const began = performance.now();
+    if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
+      this.routes.clearLayers();
+      if (plan) this.#drawRoutes(planned, plan);
+      this.drawn = { plan, planned, shift: this.shift, routes: this.routes };
+    }
     const answer = plan && !Array.isArray(plan) && planned === problem ? plan : null;
+    this.before = this.symbols;
+    this.symbols = new Map();
+    this.dots = problem.targets.length + problem.uavs.length > DOTS_FROM;
     this.#drawAreas(problem, answer);
     this.#drawUavs(problem);
+    for (const { marker, base } of this.before.values()) for (const layer of [marker, base]) if (layer) this.markers.removeLayer(layer);
+    this.before = null;
     this.#markSelection();
+    this.took = performance.now() - began;
+  }
+
+  /** Draw, but of many changes in a row not each, where that would keep the page from doing anything else. */
+  #drawSoon() {
+    if ((this.took ?? 0) * 5 < SLOW_MS) return this.#draw();
+    this.later ??= setTimeout(() => this.#draw(), Math.max(SLOW_MS, 4 * this.took));
   }
 
   #drawRoutes(problem, plan) {
@@ -135,9 +183,9 @@ export class DispatchMap {
     const stops = sum(routes.map((route) => route.stops.length));
     this.element.classList.toggle("numbered", stops <= FEW_STOPS);
     for (const { uav, index, points, stops: visits } of routes) {
-      const line = L.polyline(points.map(({ x, y }) => [y, x]), { renderer: this.renderer, className: "route", weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
+      const line = L.polyline(points.map((point) => this.#latLng(point)), { renderer: this.renderer, className: "route", weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
       line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });
-      line.bindTooltip(`${uav.id}: ${visits.map(({ target }) => target.id).join(" → ")}`, { sticky: true });
+      line.bindTooltip(() => tip(`${uav.id}: ${visits.map(({ target }) => target.id).join(" → ")}`), { sticky: true, className: "tip" });
       this.routes.addLayer(line);
       const path = line.getElement();
       path.style.setProperty("--hue", hue(index));
@@ -150,60 +198,95 @@ export class DispatchMap {
     const label = document.createElement("span");
     label.textContent = order;
     label.style.setProperty("--hue", hue(index));
-    const beside = [-7 + 13 * (index % 3), 20];
+    const beside = [-9 + 16 * (index % 3), 26];
     const icon = L.divIcon({ className: "order", html: label, iconSize: [15, 15], iconAnchor: beside });
-    this.routes.addLayer(L.marker([target.y, target.x], { icon, interactive: false, keyboard: false }));
+    this.routes.addLayer(L.marker(this.#latLng(target), { icon, interactive: false, keyboard: false, zIndexOffset: 500 }));
   }
 
   #drawAreas(problem, answer) {
     const highest = Math.max(0, ...problem.targets.map((target) => target.level));
-    const size = problem.targets.length > MANY ? 15 : 24;
+    const size = this.dots ? 10 : problem.targets.length > MANY ? 15 : 24;
     const share = met(problem, answer);
     for (const target of problem.targets) {
-      const symbol = areaSymbol(target, { highest, met: share.get(target.id), size });
-      const says = [`${target.id} · urgency ${shown(target.level)}`, `needs ${target.loadlist.map((n) => shown(n)).join(", ")}`];
-      if (answer) says.push(`${shown(100 * share.get(target.id), 3)}% met`);
-      if (target.deadline !== undefined) says.push(`by ${shown(target.deadline)}`);
-      this.#addSymbol("targets", target.id, target, symbol, size, [0, 0], says.join("\n"));
+      const looks = { urgent: urgency(target.level, highest), met: share.get(target.id), size };
+      const says = () => {
+        const lines = [`${target.id} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}`];
+        if (answer) lines.push(`${shown(100 * looks.met, 3)}% met`);
+        if (target.deadline !== undefined) lines.push(`by ${shown(target.deadline)}`);
+        return lines.join("\n");
+      };
+      this.#addSymbol("targets", target, target, () => (this.dots ? areaDot : areaSymbol)(looks), [0, 0], looks, says);
     }
   }
 
   #drawUavs(problem) {
-    const size = problem.uavs.length > 40 ? 12 : 17;
+    const size = this.dots ? 10 : problem.uavs.length > 40 ? 12 : 17;
     const crowds = new Map();
     problem.uavs.forEach((uav, index) => {
       const at = position(uav);
       const spot = `${at.x} ${at.y}`;
       const nth = crowds.get(spot) ?? 0;
       crowds.set(spot, nth + 1);
-      if (at.x !== uav.x_s || at.y !== uav.y_s) {
-        const base = L.divIcon({ className: "base", iconSize: [9, 9] });
-        this.markers.addLayer(L.marker([uav.y_s, uav.x_s], { icon: base, interactive: false, keyboard: false }));
-      }
-      const says = `${uav.id} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${uav.loadlist.map((n) => shown(n)).join(", ")}`;
-      this.#addSymbol("uavs", uav.id, at, uavSymbol(uav, index, size), size, aside(nth, size), says);
+      const says = () => `${uav.id} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${shortAmounts(uav.loadlist)}`;
+      this.#addSymbol("uavs", uav, at, () => (this.dots ? uavDot : uavSymbol)(uav, index, size), aside(nth, size), { index, size, nth, ret: uav.ret, left: rangeShare(uav).toFixed(3) }, says);
     });
   }
 
-  #addSymbol(kind, id, at, symbol, size, [dx, dy], says) {
-    const icon = L.divIcon({ className: `symbol ${kind}`, html: symbol, iconSize: [size, size], iconAnchor: [size / 2 - dx, size / 2 - dy] });
-    const marker = L.marker([at.y, at.x], { icon, draggable: !this.given, keyboard: false, riseOnHover: true });
+  /** Draw a symbol, or keep the one that shows the same. */
+  #addSymbol(kind, item, at, draw, [dx, dy], looks, says) {
+    const { id } = item;
+    const { size } = looks;
+    const key = `${kind} ${id}`;
+    const look = JSON.stringify([looks, this.dots]);
+    const known = this.before.get(key);
+    if (known?.look === look) {
+      this.before.delete(key);
+      this.symbols.set(key, known);
+      known.says = says;
+      const { lat, lng } = known.marker.getLatLng();
+      const [y, x] = this.#latLng(at);
+      if (lat !== y || lng !== x) known.marker.setLatLng([y, x]);
+      if (known.base) this.markers.removeLayer(known.base);
+      known.base = this.#drawBase(kind, item, at);
+      this.#allowMoving(known);
+      return;
+    }
+    const drawn = { look, says };
+    const icon = L.divIcon({ className: `symbol ${kind}`, html: draw(), iconSize: [size, size], iconAnchor: [size / 2 - dx, size / 2 - dy] });
+    const marker = L.marker(this.#latLng(at), { icon, keyboard: false, riseOnHover: !this.dots });
     marker.on("click", () => select({ kind, id }));
     marker.on("dragend", () => this.#moveTo(kind, id, marker.getLatLng()));
-    const tip = document.createElement("span");
-    tip.textContent = says;
-    marker.bindTooltip(tip, { direction: "top", offset: [dx, dy - size / 2], className: "tip" });
+    marker.bindTooltip(() => tip(drawn.says()), { direction: "top", offset: [dx, dy - size / 2], className: "tip" });
     this.markers.addLayer(marker);
     const element = marker.getElement();
     Object.assign(element.dataset, { kind, id });
-    this.symbols.set(`${kind} ${id}`, { marker, element });
+    this.symbols.set(key, Object.assign(drawn, { marker, element, base: this.#drawBase(kind, item, at) }));
+    if (this.dots) marker.on("mouseover", () => this.#allowMoving(drawn, true));
+    this.#allowMoving(drawn);
+  }
+
+  /** Let a symbol be dragged, unless what is drawn is no problem to edit; of very many only the one under the pointer. */
+  #allowMoving({ marker }, asked = !this.dots) {
+    if (this.given) marker.dragging.disable();
+    else if (asked) marker.dragging.enable();
+  }
+
+  /** The starting point of a UAV that is elsewhere. */
+  #drawBase(kind, item, at) {
+    if (kind !== "uavs" || (at.x === item.x_s && at.y === item.y_s)) return null;
+    const icon = L.divIcon({ className: "base", iconSize: [9, 9] });
+    const base = L.marker(this.#latLng({ x: item.x_s, y: item.y_s }), { icon, interactive: false, keyboard: false });
+    this.markers.addLayer(base);
+    return base;
   }
 
   #markSelection() {
     const { selection } = get();
     for (const [key, { marker, element }] of this.symbols) {
       const chosen = selection !== null && key === `${selection.kind} ${selection.id}`;
-      if (element.classList.toggle("selected", chosen)) marker.setZIndexOffset(1000);
+      if (element.classList.contains("selected") === chosen) continue;
+      element.classList.toggle("selected", chosen);
+      marker.setZIndexOffset(chosen ? 1000 : 0);
     }
     this.element.classList.toggle("one-route", selection?.kind === "uavs");
     for (const path of this.element.querySelectorAll("path.route")) {
@@ -225,10 +308,12 @@ export class DispatchMap {
   #rounded({ lat, lng }) {
     const { lng: beside } = this.map.layerPointToLatLng(this.map.latLngToLayerPoint([lat, lng]).add([1, 0]));
     const digits = Math.max(0, 1 - Math.floor(Math.log10(Math.abs(beside - lng) || 1)));
-    return { x: Number(lng.toFixed(Math.min(digits, 12))), y: Number(lat.toFixed(Math.min(digits, 12))) };
+    const x = this.crs === "wgs84" ? ((((lng + 180) % 360) + 360) % 360) - 180 : lng;
+    return { x: Number(x.toFixed(Math.min(digits, 12))), y: Number(lat.toFixed(Math.min(digits, 12))) };
   }
 
   #onKey(event) {
+    if (event.key === "Enter" && this.placing && event.target === this.element) return this.#onClick(this.map.getCenter());
     const { selection } = get();
     if (!selection || this.given) return;
     if (event.key === "Delete") remove(selection.kind, selection.id);

@@ -74,6 +74,11 @@ export function rangeLeft(uav) {
   return uav.voyage - (uav.dis ?? 0);
 }
 
+/** The same as a share of the whole range, 0 to 1. */
+export function rangeShare(uav) {
+  return uav.voyage > 0 ? Math.max(0, Math.min(1, rangeLeft(uav) / uav.voyage)) : 0;
+}
+
 /** Urgency class 1 to 5 of a level, against the highest of the problem. */
 export function urgency(level, highest) {
   return highest > 0 ? Math.min(5, Math.max(1, Math.ceil((5 * level) / highest))) : 1;

@@ -24,8 +24,7 @@ export async function allocate(body, { onProgress = () => {}, signal } = {}) {
 /** Follow a job to its end; throws where it failed. */
 export async function finished(id, onProgress = () => {}) {
   const began = performance.now();
-  await follow(id, (_, data) => onProgress(data, (performance.now() - began) / 1000));
-  const job = await json(`jobs/${id}`);
+  const job = await follow(id, (data) => onProgress(data, (performance.now() - began) / 1000));
   if (job.error) throw new Error(job.error.detail);
   return job;
 }

@@ -1,29 +1,40 @@
 /** Symbols on the map: an area with urgency and what is met, a UAV with its range left. */
 
-import { svg } from "./dom.js";
-import { hue, rangeLeft, urgency } from "./plan.js";
+import { h, svg } from "./dom.js";
+import { hue, rangeShare } from "./plan.js";
 
 /**
  * Draw an area: a disc in the colour of its urgency, a ring that fills with what is met.
- * @param {object} target
- * @param {{highest: number, met: number, size: number}} facts size in pixels
+ * @param {{urgent: number, met: number, size: number}} facts urgency class 1 to 5, share met, size in pixels
  */
-export function areaSymbol(target, { highest, met, size }) {
+export function areaSymbol({ urgent, met, size }) {
   const r = size / 2 - 2;
   const around = 2 * Math.PI * r;
   const ring = svg("circle", {
     class: "met", cx: size / 2, cy: size / 2, r, transform: `rotate(-90 ${size / 2} ${size / 2})`,
     "stroke-dasharray": `${(met * around).toFixed(2)} ${around.toFixed(2)}`,
   });
-  const drawn = svg("svg", { viewBox: `0 0 ${size} ${size}`, width: size, height: size, class: `area urgent-${urgency(target.level, highest)}` });
+  const drawn = svg("svg", { viewBox: `0 0 ${size} ${size}`, width: size, height: size, class: `area urgent-${urgent}` });
   drawn.append(svg("circle", { class: "need", cx: size / 2, cy: size / 2, r }), svg("circle", { class: "disc", cx: size / 2, cy: size / 2, r: r * 0.55 }));
   if (met > 0) drawn.append(ring);
   return drawn;
 }
 
+/** Draw an area among very many: a dot in the colour of its urgency, with a rim where all is met. */
+export function areaDot({ urgent, met }) {
+  return h("i", { class: `dot urgent-${urgent}${met >= 1 ? " met" : ""}` });
+}
+
+/** Draw a UAV among very many: a square in its colour, hollow where it is returning. */
+export function uavDot(uav, index) {
+  const drawn = h("i", { class: `dot uav${uav.ret ? " returning" : ""}` });
+  drawn.style.setProperty("--hue", hue(index));
+  return drawn;
+}
+
 /** Draw a UAV: a rotor cross in its colour, the range left as a bar below; hollow where it is returning. */
 export function uavSymbol(uav, index, size) {
-  const left = uav.voyage > 0 ? Math.max(0, Math.min(1, rangeLeft(uav) / uav.voyage)) : 0;
+  const left = rangeShare(uav);
   const drawn = svg("svg", { viewBox: "0 0 24 28", width: size, height: (size * 28) / 24, class: `uav${uav.ret ? " returning" : ""}` });
   drawn.style.setProperty("--hue", hue(index));
   drawn.append(

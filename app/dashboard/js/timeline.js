@@ -1,13 +1,15 @@
 /** A timeline a UAV: its legs, what it does at its stops, and the way home. */
 
-import { h, shown } from "./dom.js";
+import { h, shortAmounts, shown } from "./dom.js";
 import { hue } from "./plan.js";
+import { Portions } from "./portions.js";
 import { select } from "./state.js";
 
 /**
  * Draw the timelines of an answer.
  * @param {object} problem
  * @param {object} answer
+ * @returns {{element: HTMLElement | null, portions: Portions | null}} null where nobody flies
  */
 export function timeline(problem, answer) {
   const targets = new Map(problem.targets.map((target) => [target.id, target]));
@@ -25,19 +27,21 @@ export function timeline(problem, answer) {
     track.style.setProperty("--hue", hue(index));
     stops.forEach((stop, n) => {
       track.append(bar("leg", stop.left, stop.arrival, `to ${stop.id}`));
-      const at = bar("visit", stop.arrival, stop.done, `${n + 1}. ${stop.id} at ${shown(stop.arrival)}: ${stop.delivered.map((amount) => shown(amount)).join(", ")}`);
+      const at = bar("visit", stop.arrival, stop.done, `${n + 1}. ${stop.id} at ${shown(stop.arrival)}: ${shortAmounts(stop.delivered)}`);
       at.dataset.targetId = stop.id;
       track.append(at);
     });
     track.append(bar("leg home", stops.at(-1).done, home, `home at ${shown(home)}`));
-    return h("li", { dataset: { uavId: uav.id } }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: uav.id }) }, uav.id), track);
+    return h("li", { dataset: { uavId: uav.id } }, h("button", { type: "button", class: "quiet", title: uav.id, onclick: () => select({ kind: "uavs", id: uav.id }) }, uav.id), track);
   };
   const ticks = h("li", { class: "ticks", "aria-hidden": "true" }, h("span", {}, problem.crs === "wgs84" ? "hours" : "time"), h("div", { class: "track" }, [0, 0.25, 0.5, 0.75, 1].map((part) => {
     const tick = h("span", { class: "tick" }, shown(part * end, 3));
     tick.style.left = `${100 * part}%`;
     return tick;
   })));
-  return h("ol", { class: "timeline", "aria-label": "Timeline of each UAV" }, ticks, rows.map(row));
+  if (!rows.length) return { element: null, portions: null };
+  const element = h("ol", { class: "timeline", "aria-label": "Timeline of each UAV" }, ticks);
+  return { element, portions: new Portions(element, rows, row, (button) => h("li", {}, button)) };
 }
 
 /** When a UAV leaves, arrives and is done at each stop, and when it is home. */

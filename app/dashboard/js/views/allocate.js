@@ -3,7 +3,7 @@
 import { allocate, cancel, running } from "../allocation.js";
 import { json } from "../api.js";
 import { drawCurves } from "../curve.js";
-import { h, notify, number } from "../dom.js";
+import { h, notify, number, shown } from "../dom.js";
 import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
 import { get, set, select, subscribe } from "../state.js";
@@ -11,8 +11,10 @@ import { get, set, select, subscribe } from "../state.js";
 const PREFERRED = ["auto", "transfer_qmix"];
 const PROBLEM_FIELDS = new Set(["uavs", "targets", "max_steps", "crs", "objective"]);
 const OWN_FIELDS = new Set(["algorithm", "parameters"]);
+const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
 const FIRST_LIMIT_S = 5;
 const REDRAW_MS = 150;
+const SAY_EVERY_MS = 6000;
 
 /** The form; returns it with a function that reads it. */
 function makeForm(schemas) {
@@ -42,7 +44,10 @@ function makeForm(schemas) {
     h("div", { class: "row" }, start, stop), elsewhere);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    if (!running(get().job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values() });
+    const { job, problem } = get();
+    const none = ["uavs", "targets"].filter((kind) => !problem[kind].length);
+    if (none.length) set({ violations: none.map((kind) => ({ pointer: `/${kind}`, detail: "none yet: place at least one on the map" })) });
+    else if (!running(job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values() });
   });
   const enable = () => {
     start.disabled = running(get().job);
@@ -68,9 +73,9 @@ function violation({ pointer, detail }) {
   const go = () => {
     if (item?.id) select({ kind, id: item.id });
     set({ view: "problem" });
-    document.querySelector(`table[data-kind="${kind}"] tr:nth-child(${Number(at) + 1}) td[data-column^="${field}"]`)?.focus();
+    document.querySelector(`table[data-kind="${kind}"] tr[data-id="${CSS.escape(item?.id ?? "")}"] td[data-column^="${field}"]`)?.focus();
   };
-  const where = item?.id ? `${item.id}, ${field ?? ""}` : pointer;
+  const where = item?.id ? [item.id, field].filter(Boolean).join(", ") : (PARTS[pointer] ?? pointer);
   return h("li", { class: "error" }, h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where), ` ${detail}`);
 }
 
@@ -78,13 +83,29 @@ function violation({ pointer, detail }) {
 function makeProgress() {
   const bar = h("progress", { max: "1", "aria-label": "Progress" });
   const facts = h("dl", { class: "figures" });
-  const root = h("div", { class: "card", id: "progress", "aria-live": "off" }, h("div", { class: "row spread" }, h("h3", {}, "Job"), h("span", { class: "chip", id: "job-status" })), bar, facts);
+  const wrong = h("p", { class: "error", id: "job-error", role: "alert" });
+  const said = h("p", { class: "visually-hidden", role: "status", id: "reward-said" });
+  const root = h("div", { class: "card", id: "progress" }, h("div", { class: "row spread" }, h("h2", {}, "Job"), h("span", { class: "chip", id: "job-status" })), bar, facts, wrong, said);
+  let saidAt = -Infinity;
+  let saidOf = "";
+  // Someone who listens to the page hears of the start, the end, and now and then of the reward.
+  const say = (job) => {
+    const of = `${job.status} ${job.best_reward == null}`;
+    if (of === saidOf && performance.now() - saidAt < SAY_EVERY_MS) return;
+    saidAt = performance.now();
+    saidOf = of;
+    const text = job.best_reward == null ? `The job is ${job.status}.` : `The job is ${job.status}, best reward ${shown(job.best_reward)}.`;
+    if (said.textContent !== text) said.textContent = text;
+  };
   const figure = (title, value) => h("div", { class: "figure" }, h("dt", {}, title), h("dd", {}, value));
   const draw = ({ job }) => {
     root.hidden = job === null;
     if (!job) return;
     root.querySelector("#job-status").textContent = job.status;
     bar.value = job.fraction ?? 0;
+    wrong.textContent = job.error ?? "";
+    wrong.hidden = !job.error;
+    say(job);
     facts.replaceChildren(figure("Best reward", number(job.best_reward)), figure("Epoch", number(job.epoch)), figure("Seconds", job.trace.length ? number(job.trace.at(-1).t, 3) : "–"));
   };
   subscribe(["job"], draw);
@@ -99,7 +120,7 @@ function makeChart(dock) {
   const draw = () => {
     waiting = null;
     const { job } = get();
-    if (!job) return;
+    if (!job || (job.status === "failed" && !job.trace.length)) return dock.replaceChildren();
     if (!dock.childElementCount) dock.append(chart);
     const points = job.trace.filter(({ reward }) => reward !== null).map(({ t, reward }) => [t, reward]);
     drawCurves(chart, [{ name: job.algorithm, points }], { x: "seconds", height: 170, label: `Reward against time, now ${job.best_reward}` });
@@ -115,9 +136,16 @@ registerView({
   id: "allocate", title: "Allocate", order: 20, layout: "panel",
   mount(root, { dock }) {
     redraw = makeChart(dock);
-    json("openapi.json")
-      .then(({ components }) => root.append(makeForm(components.schemas), makeProgress()))
-      .catch((error) => notify(error.message, "error"));
+    const waiting = h("p", { class: "hint" }, "The service has not said yet what it offers.");
+    root.append(waiting);
+    const fill = async () => {
+      if (!get().algorithms.length || !waiting.isConnected) return;
+      const { components } = await json("openapi.json");
+      waiting.replaceWith(makeForm(components.schemas), makeProgress());
+    };
+    const tryToFill = () => fill().catch((error) => notify(error.message, "error"));
+    subscribe(["algorithms"], tryToFill);
+    tryToFill();
   },
   show: () => redraw(),
 });

@@ -1,10 +1,14 @@
 /** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
 
-import { h, number, shown } from "../dom.js";
+import { amounts, h, number, shown } from "../dom.js";
 import { hue, sum } from "../plan.js";
+import { Portions } from "../portions.js";
 import { registerView } from "../registry.js";
 import { get, select, set, subscribe } from "../state.js";
 import { timeline } from "../timeline.js";
+
+const LEAST_GAP = 1e-5;
+const long = { routes: null, unmet: null, timeline: null };
 
 function figures(answer) {
   const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight, 3], ["Seconds", answer.elapsed_s, 3]];
@@ -20,7 +24,7 @@ function boundFigures({ bound, gap }) {
   const facts = [];
   if (typeof bound === "number") facts.push(figure("Bound", bound));
   if (typeof gap === "number") {
-    const share = h("data", { value: String(gap), title: String(gap) }, `${shown(100 * gap, 3)} %`);
+    const share = h("data", { value: String(gap), title: String(gap) }, gap < LEAST_GAP ? "under 0.001 %" : `${shown(100 * gap, 3)} %`);
     facts.push(h("div", { class: "figure", dataset: { figure: "Gap" } }, h("dt", {}, "Gap"), h("dd", {}, share)));
   }
   return facts;
@@ -33,25 +37,27 @@ function source(answer) {
   return h("p", { class: "hint", id: "source" }, `${how}. Policy `, h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
 }
 
-function routeRows(problem, answer) {
+function routeRows(problem) {
   const indices = new Map(problem.uavs.map((uav, index) => [uav.id, index]));
-  return answer.routes.filter((route) => route.stops.length).flatMap((route) =>
+  return (route) =>
     route.stops.map((stop, n) => {
       const key = h("span", { class: "key", "aria-hidden": "true" });
       key.style.setProperty("--hue", hue(indices.get(route.uav_id)));
-      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
+      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
       return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
-        h("td", { class: "num" }, String(n + 1)), h("td", {}, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
-        h("td", { class: "num" }, stop.delivered.flatMap((amount, k) => [k ? ", " : null, number(amount)])));
-    }),
-  );
+        h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
+        h("td", { class: "num" }, amounts(stop.delivered)));
+    });
 }
 
 function routesTable(problem, answer) {
   const head = ["UAV", "#", "Area", problem.crs === "wgs84" ? "Arrives, h" : "Arrives", "Unloads"];
-  const out = answer.routes.filter((route) => route.stops.length).length;
-  return h("details", { open: true }, h("summary", {}, `Routes of ${out} of ${problem.uavs.length} UAVs`),
-    h("div", { class: "scroll" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title) => h("th", { scope: "col" }, title)))), h("tbody", {}, routeRows(problem, answer)))));
+  const out = answer.routes.filter((route) => route.stops.length);
+  if (!out.length) return h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance.");
+  const body = h("tbody", {});
+  long.routes = new Portions(body, out, routeRows(problem), (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
+  return h("details", { open: true }, h("summary", {}, `Routes of ${out.length} of ${problem.uavs.length} UAVs`),
+    h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [1, 3, 4].includes(at) ? "num" : null }, title)))), body)));
 }
 
 function unmetList(problem, answer) {
@@ -59,10 +65,12 @@ function unmetList(problem, answer) {
   const needs = new Map(problem.targets.map((target) => [target.id, sum(target.loadlist)]));
   const item = (unmet) =>
     h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
-      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "targets", id: unmet.target_id }) }, unmet.target_id), h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
-      h("p", {}, "lacks ", unmet.remaining.flatMap((amount, k) => [k ? ", " : null, number(amount)]), h("span", { class: "hint" }, ` of ${shown(needs.get(unmet.target_id))}`)),
-      h("p", { class: "hint" }, unmet.reason), typeof unmet.remedy === "string" && h("p", { class: "hint" }, unmet.remedy));
-  return h("details", { open: answer.unmet.length > 0 }, h("summary", {}, title), h("ul", { class: "unmet", id: "unmet" }, answer.unmet.map(item)));
+      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "targets", id: unmet.target_id }) }, unmet.target_id), unmet.code && h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
+      h("p", {}, "lacks ", amounts(unmet.remaining), h("span", { class: "hint" }, ` of ${shown(needs.get(unmet.target_id))}`)),
+      h("p", { class: "hint" }, unmet.reason), typeof unmet.remedy === "string" && h("p", { class: "hint" }, `Would help: ${unmet.remedy}`));
+  const list = h("ul", { class: "unmet", id: "unmet" });
+  long.unmet = new Portions(list, answer.unmet, item, (button) => h("li", {}, button));
+  return h("details", { open: answer.unmet.length > 0 }, h("summary", {}, title), list);
 }
 
 registerView({
@@ -76,12 +84,22 @@ registerView({
         root.replaceChildren(h("p", { class: "hint" }, "No plan yet."), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, "Allocate")));
         return dock.replaceChildren();
       }
+      Object.assign(long, { routes: null, unmet: null, timeline: null });
       root.replaceChildren(stale, figures(answer), source(answer), routesTable(answerProblem, answer), unmetList(answerProblem, answer));
-      dock.replaceChildren(timeline(answerProblem, answer));
+      const { element, portions } = timeline(answerProblem, answer);
+      long.timeline = portions;
+      dock.replaceChildren(...(element ? [element] : []));
       markSelection();
     };
     const markSelection = () => {
       const { selection } = get();
+      if (selection?.kind === "uavs") {
+        long.routes?.reveal((route) => route.uav_id === selection.id);
+        long.timeline?.reveal(({ uav }) => uav.id === selection.id);
+      } else if (selection) {
+        long.routes?.reveal((route) => route.stops.some((stop) => stop.target_id === selection.id));
+        long.unmet?.reveal((unmet) => unmet.target_id === selection.id);
+      }
       for (const row of [...root.querySelectorAll("#routes tbody tr"), ...dock.querySelectorAll("li[data-uav-id]")]) {
         const chosen = selection?.kind === "uavs" ? row.dataset.uavId === selection.id : selection !== null && row.dataset.targetId === selection.id;
         row.classList.toggle("chosen", chosen);

@@ -1,13 +1,17 @@
 /** In the field: a mission at a moment of its plan, what has happened until then, and a new plan from there. */
 
 import { ApiError } from "../api.js";
-import { h, notify, number, shown } from "../dom.js";
+import { h, notify, number, shortAmounts, shown } from "../dom.js";
 import { changes, missionEnd, moments, problemAt, remainder, uavAt } from "../mid_mission.js";
+import { sum } from "../plan.js";
+import { Portions } from "../portions.js";
 import { registerView } from "../registry.js";
 import { allocate } from "../running.js";
 import { get, set, subscribe } from "../state.js";
 
 const FRAMES = 240; // the whole mission in about 12 s
+const FRAME_MS = 50;
+const FEW_KINDS = 8;
 
 let parts = null;
 let map = null;
@@ -17,6 +21,9 @@ let happened = new Map(); // area id → {level, loadlist} as it is now
 let found = []; // new areas
 let outcome = null; // {now, difference, answer}
 let ticking = null;
+const unfolded = new Set(); // areas of many kinds whose needs are to be seen
+let shownUavs = 0; // rows that were asked for
+let shownAreas = 0;
 let stopping = null;
 let known = null; // the answer that all of the above is about
 
@@ -124,15 +131,20 @@ function toggle() {
     const end = missionEnd(problem, answer);
     if (clock >= end) clock = 0;
     parts.run.textContent = "Halt";
-    ticking = setInterval(() => {
-      moveTo(clock + end / FRAMES);
+    const tick = () => {
+      const began = performance.now();
+      moveTo(clock + Math.max(end / FRAMES, (end / FRAMES) * (took / FRAME_MS)));
+      took = performance.now() - began;
       if (clock >= end) halt();
-    }, 50);
+      else ticking = setTimeout(tick, Math.max(FRAME_MS - took, took));
+    };
+    let took = 0;
+    ticking = setTimeout(tick, FRAME_MS);
   }
 }
 
 function halt() {
-  clearInterval(ticking);
+  clearTimeout(ticking);
   ticking = null;
   if (parts) parts.run.textContent = "Let it run";
 }
@@ -175,10 +187,12 @@ function drawMap(now) {
 function drawUavs(now) {
   const { answer, problem } = mission();
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
+  const body = h("tbody", {});
   parts.uavs.replaceChildren(
     h("table", { "data-testid": "field-uavs" },
       h("thead", {}, h("tr", {}, ["UAV", "Doing", "Range left", "Load", "Lost"].map((title, i) => h("th", { scope: "col", class: i === 2 || i === 3 ? "n" : null }, title)))),
-      h("tbody", {}, problem.uavs.map((uav, i) => {
+      body));
+  const rows = new Portions(body, problem.uavs, (uav, i) => {
         const is = uavAt(problem, answer, i, clock);
         const doing = { flying: `to ${is.next}`, unloading: `at ${is.next}` }[is.doing] ?? is.doing;
         const gone = lost.has(uav.id);
@@ -186,29 +200,35 @@ function drawUavs(now) {
           h("th", { scope: "row" }, uav.id),
           h("td", {}, gone ? "lost" : doing),
           h("td", { class: "n" }, gone ? "–" : number(uav.voyage - is.flown)),
-          h("td", { class: "n" }, gone ? "–" : left.get(uav.id).loadlist.map((amount) => shown(amount)).join(" · ")),
+          h("td", { class: "n load" }, gone ? "–" : shortAmounts(left.get(uav.id).loadlist, " · ")),
           h("td", {}, h("input", {
             type: "checkbox", "aria-label": `${uav.id} is lost`, checked: gone,
             onchange: (event) => { lost = new Set(lost); lost[event.target.checked ? "add" : "delete"](uav.id); draw(); },
           })));
-      }))));
+      }, (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
+  rows.upTo(Math.min(shownUavs, problem.uavs.length));
+  body.addEventListener("click", () => { shownUavs = Math.max(shownUavs, rows.count); });
 }
 
 function drawAreas(now) {
   const fresh = new Set(found.map(({ id }) => id));
+  const body = h("tbody", {});
   parts.areas.replaceChildren(
     h("table", { "data-testid": "field-areas" },
-      h("thead", {}, h("tr", {}, ["Area", "Level", "Still needed", ""].map((title) => h("th", { scope: "col" }, title)))),
-      h("tbody", {}, now.targets.map((target) =>
+      h("thead", {}, h("tr", {}, ["Area", "Level", "Still needed"].map((title) => h("th", { scope: "col" }, title)), h("th", { scope: "col" }, h("span", { class: "visually-hidden" }, "Undo")))),
+      body));
+  const rows = new Portions(body, [...now.targets].sort((a, b) => fresh.has(b.id) - fresh.has(a.id)), (target) =>
         h("tr", { class: fresh.has(target.id) ? "new" : happened.has(target.id) ? "changed" : null, "data-area": target.id },
           h("th", { scope: "row" }, target.id,
             fresh.has(target.id) && h("span", { class: "place" }, field(target, "x", "x"), field(target, "y", "y"))),
           h("td", {}, field(target, "level", "level")),
-          h("td", { class: "amounts" }, target.loadlist.map((amount, k) =>
-            amountField(target, amount, k))),
+          h("td", {}, needFields(target)),
           h("td", {}, fresh.has(target.id)
             ? h("button", { type: "button", class: "quiet", onclick: () => { found = found.filter(({ id }) => id !== target.id); redraw(); } }, "Remove")
-            : happened.has(target.id) && h("button", { type: "button", class: "quiet", onclick: () => { happened.delete(target.id); redraw(); } }, "Undo")))))));
+            : happened.has(target.id) && h("button", { type: "button", class: "quiet", onclick: () => { happened.delete(target.id); redraw(); } }, "Undo"))),
+    (button) => h("tr", {}, h("td", { colspan: "4" }, button)));
+  rows.upTo(Math.min(shownAreas, now.targets.length));
+  body.addEventListener("click", () => { shownAreas = Math.max(shownAreas, rows.count); });
 }
 
 function redraw() {
@@ -221,6 +241,15 @@ function field(target, name, what) {
     type: "number", step: "any", value: String(target[name]), "aria-label": `${what} of ${target.id}`,
     onchange: (event) => changed(target, { [name]: Number(event.target.value) }),
   });
+}
+
+/** A field for each kind needed; of many kinds folded up. */
+function needFields(target) {
+  const fields = h("div", { class: "amounts" }, target.loadlist.map((amount, k) => amountField(target, amount, k)));
+  if (target.loadlist.length <= FEW_KINDS) return fields;
+  const open = unfolded.has(target.id);
+  return h("details", { open, ontoggle: (event) => unfolded[event.target.open ? "add" : "delete"](target.id) },
+    h("summary", {}, `${shown(sum(target.loadlist))} of ${target.loadlist.filter(Boolean).length} kinds`), fields);
 }
 
 function amountField(target, amount, k) {

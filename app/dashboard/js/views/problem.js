@@ -19,7 +19,9 @@ const COLUMNS = {
 const KINDS = { uavs: "UAVs", targets: "Areas" };
 
 function columnsOf(kind, problem) {
-  const fields = Object.entries(COLUMNS[kind]).map(([name, title]) => ({ name, title, read: (item) => item[name] }));
+  const globe = problem.crs === "wgs84";
+  const told = (title) => (globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title);
+  const fields = Object.entries(COLUMNS[kind]).map(([name, title]) => ({ name, title: told(title), read: (item) => item[name] }));
   const loads = Array.from({ length: materials(problem) }, (_, k) => ({
     name: `loadlist/${k}`, title: `${kind === "uavs" ? "load" : "need"} ${k + 1}`, read: (item) => item.loadlist[k],
   }));
@@ -81,14 +83,22 @@ function mountTables(dock) {
   draw();
 }
 
-async function mountExamples(root) {
+async function fillExamples(root) {
+  if (!get().algorithms.length || root.dataset.filled) return;
+  root.dataset.filled = "true";
   const { examples } = await json("examples");
-  root.append(
+  root.prepend(
     ...examples.map(({ name, href }) =>
       h("button", { type: "button", dataset: { example: name }, onclick: async () => open(await json(href), name) }, name),
     ),
-    h("button", { type: "button", onclick: () => open({ crs: get().problem.crs }, "New problem") }, "Empty"),
   );
+}
+
+function mountExamples(root) {
+  root.append(h("button", { type: "button", onclick: () => open({ crs: get().problem.crs }, "New problem") }, "Empty"));
+  const fill = () => fillExamples(root).catch((error) => notify(error.message, "error"));
+  subscribe(["algorithms"], fill);
+  fill();
 }
 
 async function takeIn(file) {
@@ -184,6 +194,7 @@ registerView({
     );
     mountTables(dock);
     mountInspector(inspector);
-    for (const filling of [mountExamples(examples), mountSettings(settings)]) filling.catch((error) => notify(error.message, "error"));
+    mountExamples(examples);
+    mountSettings(settings).catch((error) => notify(error.message, "error"));
   },
 });

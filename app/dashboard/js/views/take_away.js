@@ -1,6 +1,6 @@
 /** Plans to take away: flight files, GeoJSON, a table, a page to print. */
 
-import { address, ApiError, send } from "../api.js";
+import { address, ApiError, hasKey, send } from "../api.js";
 import { download, h, notify } from "../dom.js";
 import { registerView } from "../registry.js";
 import { get, subscribe } from "../state.js";
@@ -80,7 +80,8 @@ function draw() {
   for (const button of parts.flight.children) button.disabled = !answer || !geographic;
   for (const button of parts.documents.querySelectorAll("button")) button.disabled = !answer;
   const link = parts.documents.querySelector("a");
-  link.hidden = !answer;
+  // A new tab has no key to ask with.
+  link.hidden = !answer || hasKey();
   if (answer) link.href = address(`jobs/${answer.job_id}/plan?format=html`);
   parts.state.textContent = !answer
     ? "Allocate first: there is no plan yet."

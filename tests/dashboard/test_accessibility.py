@@ -1,0 +1,166 @@
+"""Every view and dialog of the dashboard against axe-core's rules of WCAG 2.2, levels A and AA, and by keyboard alone."""
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from dashboard_steps import go, open_problem, ready, show_answer, state
+from playwright.sync_api import expect
+
+RULES = {
+    "resultTypes": ["violations"],
+    "runOnly": {
+        "type": "tag",
+        "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    },
+}
+VIEWS = ("problem", "allocate", "answer", "compare", "field", "library", "take-away")
+FOCUSED = "document.activeElement.id || document.activeElement.textContent"
+
+
+@pytest.fixture
+def audited(browser, service):
+    """The dashboard in a context of its own: the auditor's script is one that the page's policy would refuse."""
+    context = browser.new_context(
+        viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
+    )
+    context.set_default_timeout(20_000)
+    page = context.new_page()
+    page.goto(service.url)
+    ready(page)
+    yield page
+    context.close()
+
+
+def violations(page):
+    """What axe-core finds, each with the elements it is about."""
+    found = Axe().run(page, options=RULES).response["violations"]
+    return [(rule["id"], [node["html"][:200] for node in rule["nodes"]]) for rule in found]
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1366, "light"), (820, "dark")])
+def test_no_view_breaks_a_rule(audited, service, width, scheme):
+    page = audited
+    page.set_viewport_size({"width": width, "height": 1100})
+    page.emulate_media(color_scheme=scheme)
+    show_answer(page, service.url, algorithm="greedy")
+    page.locator(".symbol.targets").first.click()
+    faults = {}
+    for view in VIEWS:
+        go(page, view)
+        page.wait_for_load_state("networkidle")
+        page.locator(f"#view-{view} details").evaluate_all(
+            "all => all.forEach((each) => { each.open = true; })"
+        )
+        faults[view] = violations(page)
+    page.click("#key")
+    faults["key"] = violations(page)
+
+    assert {view: found for view, found in faults.items() if found} == {}
+
+
+def test_no_refusal_and_no_message_breaks_a_rule(audited):
+    page = audited
+    open_problem(page, {}, "nothing yet")
+    go(page, "allocate")
+    page.click("#start")
+    expect(page.locator("#violations li")).to_have_count(2)
+    page.locator("#import").set_input_files(
+        {"name": "bad.csv", "mimeType": "text/csv", "buffer": b"kind,id\n?,a\n"}
+    )
+    expect(page.locator("#alerts .notice")).to_have_count(1)
+
+    assert violations(page) == []
+    page.get_by_label("Close this message").click()
+    expect(page.locator("#alerts .notice")).to_have_count(0)
+
+
+def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
+    ready(page)
+    page.locator("#key").press("Enter")
+    expect(page.locator("#key-input")).to_be_focused()
+    visited = set()
+    for _ in range(8):
+        page.keyboard.press("Tab")
+        visited.add(page.evaluate(FOCUSED))
+    page.keyboard.press("Shift+Tab")
+    # Beside the dialog's own, the browser's frame is on the way, in which no element of the page has the focus.
+    inside = page.evaluate(
+        "document.activeElement.closest('dialog') !== null || document.activeElement === document.body"
+    )
+    page.keyboard.press("Escape")
+
+    assert inside
+    assert {"key-input", "key-cancel", "Use key"} <= visited
+    assert not visited & {f"tab-{view}" for view in VIEWS}
+    expect(page.locator("#key")).to_be_focused()
+
+
+def test_the_focus_goes_from_the_tabs_to_the_map_to_the_panel(page):
+    ready(page)
+    page.wait_for_selector("[data-example]")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    order = []
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        place = page.evaluate(
+            "['tabs', 'map', 'dock', 'panel'].find((id) => document.activeElement.closest(`#${id}`)) ?? null"
+        )
+        if place is not None and place not in order:
+            order.append(place)
+    assert order == ["tabs", "map", "dock", "panel"]
+
+
+def test_what_has_the_focus_is_seen(page):
+    ready(page)
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        style = page.evaluate(
+            "() => { const { outlineStyle, outlineWidth } = getComputedStyle(document.activeElement);"
+            " return [outlineStyle, parseFloat(outlineWidth)]; }"
+        )
+        assert style[0] != "none"
+        assert style[1] >= 1
+
+
+def test_the_keyboard_alone_places_and_moves_an_area(page):
+    ready(page)
+    page.locator("[data-place=targets]").press("Enter")
+    before = state(page, "problem")["targets"]
+    page.locator("#map").focus()
+    page.keyboard.press("Enter")
+    page.keyboard.press("Escape")
+    placed = state(page, "problem")["targets"][len(before) :]
+    assert len(placed) == 1
+
+    page.locator(f"table[data-kind=targets] tr[data-id='{placed[0]['id']}'] td").first.click()
+    page.locator("#map").focus()
+    page.keyboard.press("Alt+ArrowUp")
+    assert state(page, "problem")["targets"][-1]["y"] > placed[0]["y"]
+
+
+def test_the_reward_is_said_while_it_climbs_and_at_the_end(page):
+    ready(page)
+    go(page, "allocate")
+    page.select_option("select[name=algorithm]", "ga")
+    page.fill("input[name=time_limit_s]", "")
+    page.locator("#parameters").evaluate("details => { details.open = true; }")
+    page.fill("#parameters input[name=iteration]", "1000000")
+    page.click("#start")
+    said = page.locator("#reward-said[role=status]")
+    expect(said).to_contain_text("The job is running, best reward")
+    page.click("#cancel")
+    page.wait_for_selector("#figures")
+    expect(said).to_contain_text("The job is cancelled, best reward")
+
+
+def test_motion_is_left_out_where_it_is_not_wanted(browser, service):
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.goto(service.url)
+    ready(page)
+    before = page.locator(".leaflet-map-pane").get_attribute("class")
+    page.get_by_label("Zoom in").click()
+
+    assert "leaflet-zoom-anim" not in before
+    assert page.evaluate("document.getAnimations().length") == 0
+    context.close()
