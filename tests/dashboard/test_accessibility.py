@@ -1,4 +1,4 @@
-"""Every view and dialog of the dashboard against axe-core's rules of WCAG 2.2, levels A and AA, and by keyboard alone."""
+"""Every view and dialog of the dashboard against axe-core's rules of WCAG 2.2 (A, AA), and by keyboard."""
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -18,7 +18,7 @@ FOCUSED = "document.activeElement.id || document.activeElement.textContent"
 
 @pytest.fixture
 def audited(browser, service):
-    """The dashboard in a context of its own: the auditor's script is one that the page's policy would refuse."""
+    """The dashboard in a context of its own: the page's policy would refuse the auditor's script."""
     context = browser.new_context(
         viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
     )
