@@ -82,7 +82,7 @@ def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
         page.keyboard.press("Tab")
         visited.add(page.evaluate(FOCUSED))
     page.keyboard.press("Shift+Tab")
-    # Beside the dialog's own, the browser's frame is on the way, in which no element of the page has the focus.
+    # The browser's own frame is on the way too; no element of the page has the focus then.
     inside = page.evaluate(
         "document.activeElement.closest('dialog') !== null || document.activeElement === document.body"
     )

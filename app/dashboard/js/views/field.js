@@ -11,6 +11,7 @@ import { get, set, subscribe } from "../state.js";
 
 const FRAMES = 240; // the whole mission in about 12 s
 const FRAME_MS = 50;
+const MOST_FRAMES = 3; // left out at once where drawing is slow
 const FEW_KINDS = 8;
 
 let parts = null;
@@ -133,7 +134,7 @@ function toggle() {
     parts.run.textContent = "Halt";
     const tick = () => {
       const began = performance.now();
-      moveTo(clock + Math.max(end / FRAMES, (end / FRAMES) * (took / FRAME_MS)));
+      moveTo(clock + (end / FRAMES) * Math.min(MOST_FRAMES, Math.max(1, took / FRAME_MS)));
       took = performance.now() - began;
       if (clock >= end) halt();
       else ticking = setTimeout(tick, Math.max(FRAME_MS - took, took));
