@@ -123,7 +123,8 @@ def mutant(seed: int, number: int, paths: Sequence[str], sound: Mapping[str, Seq
     text = json.dumps(body)
     if _HOLE_TEXT in text:
         literals = rng.choice((_LITERALS, _LITERALS, _DEEP, _BROKEN_LITERALS))
-        text = text.replace(_HOLE_TEXT, rng.choice(literals))
+        # A list of holes may be long: with all of them filled it would be hundreds of megabytes.
+        text = text.replace(_HOLE_TEXT, rng.choice(literals), 100)
     if rng.random() < 0.05:
         text = _with_name_twice(rng, text)
     raw = text.encode()
@@ -134,6 +135,9 @@ def mutant(seed: int, number: int, paths: Sequence[str], sound: Mapping[str, Seq
 
 
 _HOLE_TEXT = json.dumps(_HOLE)
+
+_LONGEST = 20_000_000
+"""Letters that a repeated value takes at most; the service takes bodies of 8 MiB."""
 
 
 def _places(value: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -167,9 +171,9 @@ def _rebuilt(rng: random.Random, body: Any) -> Any:
         case 7:
             place[last] = [_HOLE]
         case 8:
-            place[last] = [old] * rng.choice((2, 65, 1001, 2001))
+            place[last] = _repeated(rng, [old], (2, 65, 1001, 2001))
         case 9 if isinstance(old, list) and old:
-            place[last] = old * rng.choice((2, 13, 101))
+            place[last] = _repeated(rng, old, (2, 13, 101))
         case 10 if _is_number(old):
             place[last] = rng.choice(
                 (-old, old * 1e12, old / 1e12, str(old), old + 0.5, int(old), float(old))
@@ -177,6 +181,14 @@ def _rebuilt(rng: random.Random, body: Any) -> Any:
         case _:
             return {**body, rng.choice(("", "uavs ", "UAVS", "\ud800", "__proto__", "a/b~c")): old}
     return body
+
+
+def _repeated(rng: random.Random, parts: list[Any], counts: Sequence[int]) -> list[Any]:
+    """Repeat a list; only twice where it would become too long. Nothing is shared among the copies."""
+    count = rng.choice(counts)
+    if count * len(json.dumps(parts)) > _LONGEST:
+        count = 2
+    return [copy.deepcopy(part) for _ in range(count) for part in parts]
 
 
 def _extend(rng: random.Random, place: Any, old: Any) -> None:
