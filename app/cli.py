@@ -328,7 +328,11 @@ def backup(
     To go back to it, stop the service and put the copy in the place of allocator.sqlite3; remove the files
     allocator.sqlite3-wal and allocator.sqlite3-shm beside it.
     """
-    source = make_url(_settings(data_dir=data_dir).resolved_database_url).database
+    url = make_url(_settings(data_dir=data_dir).resolved_database_url)
+    if url.get_backend_name() != "sqlite":
+        typer.echo("this copies an SQLite file; a PostgreSQL database is copied by pg_dump", err=True)
+        raise typer.Exit(1)
+    source = url.database
     try:
         size = back_up(Path(str(source)), file)
     except BackupFailed as error:

@@ -28,7 +28,9 @@ class Settings(BaseSettings):
     )
     data_dir: Path = Field(default=Path("data"), description="Folder of the database; made where missing")
     database_url: str | None = Field(
-        default=None, description="SQLAlchemy URL; default: the file `allocator.sqlite3` in the data folder"
+        default=None,
+        description="SQLAlchemy URL of SQLite or PostgreSQL; default: the file `allocator.sqlite3` in the "
+        "data folder",
     )
 
     no_keys: bool = Field(

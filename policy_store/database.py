@@ -1,4 +1,7 @@
-"""A database with one writer and many readers, and its migrations.
+"""A database, SQLite or PostgreSQL, and its migrations.
+
+SQLite has one writer at a time and many readers, and belongs to one service. PostgreSQL may be shared by
+services on several machines, whose writers go on beside each other.
 
 A use case is one transaction: ``with database.write() as connection`` commits at its end, or rolls back if
 an exception leaves it. What must be atomic together is done over one connection.
@@ -7,53 +10,69 @@ an exception leaves it. What must be atomic together is done over one connection
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from alembic import command
 from alembic.config import Config
 from alembic.util import CommandError
-from sqlalchemy import Connection, Engine, make_url
+from sqlalchemy import URL, Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError
 
+from policy_store import postgresql, sqlite
+from policy_store.announcements import Announcements
+from policy_store.engines import Engines
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
-from policy_store.sqlite import broken_references, open_sqlite
 
 
-class _WriterLock:
-    """Lets one thread of the process write at a time; a second write of the same thread is a mistake."""
+class _Writers:
+    """Finds a second write of the same thread, which is a mistake: it would wait for itself.
 
-    def __init__(self, name: str) -> None:
+    Parameters
+    ----------
+    name
+        Of the database.
+    take_turns
+        Whether one thread of the process writes at a time.
+    """
+
+    def __init__(self, name: str, take_turns: bool) -> None:
         self._name = name
-        self._lock = threading.Lock()
-        self._owner: int | None = None
+        self._turn: AbstractContextManager[object] = threading.Lock() if take_turns else nullcontext()
+        self._mine = threading.local()
 
     @contextmanager
     def hold(self) -> Iterator[None]:
-        me = threading.get_ident()
-        if self._owner == me:
+        if getattr(self._mine, "writes", False):
             raise NestedWrite(self._name)
-        with self._lock:
-            self._owner = me
+        with self._turn:
+            self._mine.writes = True
             try:
                 yield
             finally:
-                self._owner = None
+                self._mine.writes = False
 
 
 _registry_lock = threading.Lock()
-_writer_locks: dict[str, _WriterLock] = {}
+_writers: dict[str, _Writers] = {}
 # Alembic hands its environment over in module globals. Two threads that migrate different databases would run
 # statements on each other's connection, which ends in a segmentation fault.
 _migration_lock = threading.Lock()
 
 
-def _writer_lock(name: str) -> _WriterLock:
-    """Return the lock of a database: one in the process, however many ``Database`` objects share it."""
+def _writers_of(engines: Engines) -> _Writers:
+    """Return the writers of a database: one object in the process, however many ``Database`` share it."""
     with _registry_lock:
-        return _writer_locks.setdefault(name, _WriterLock(name))
+        name = engines.lock_name
+        return _writers.setdefault(name, _Writers(name, take_turns=not engines.shared))
+
+
+def _without_password(url: URL) -> str:
+    return URL.create(
+        url.drivername, url.username, None, url.host, url.port, url.database, url.query
+    ).render_as_string()
 
 
 class Database:
@@ -62,14 +81,19 @@ class Database:
     Parameters
     ----------
     url
-        ``sqlite:///relative/path`` or ``sqlite:////absolute/path``. A missing folder is made.
+        ``sqlite:///relative/path`` or ``sqlite:////absolute/path``; a missing folder is made. Or
+        ``postgresql://user@host/database``.
     write_json, read_json
         How columns of JSON are written and read; default: as the standard library does it.
 
     Attributes
     ----------
     url
-        The URL as given.
+        The URL, without a password: what is written down may name it.
+    environment
+        Variables under which another process can open that URL: the password, where there is one.
+    shared
+        Whether other processes may write to it at the same time.
     write_engine, read_engine
         The engines behind :meth:`write` and :meth:`read`. Writing past :meth:`write` would go round the
         lock that makes writers take turns.
@@ -77,7 +101,8 @@ class Database:
     Raises
     ------
     UnsupportedDatabase
-        If the URL is none, or names a database that is not SQLite in a file.
+        If the URL is none, names a database that is neither SQLite in a file nor PostgreSQL, or one whose
+        driver is not installed.
     """
 
     def __init__(
@@ -90,29 +115,39 @@ class Database:
             parsed = make_url(url)
         except ArgumentError as error:
             raise UnsupportedDatabase(url, "it is not a database URL") from error
-        if parsed.drivername not in ("sqlite", "sqlite+pysqlite"):
-            raise UnsupportedDatabase(str(parsed), f"{parsed.drivername} is not supported, only sqlite")
-        engines = open_sqlite(parsed, write_json, read_json)
-        self.url = url
+        if parsed.drivername in ("sqlite", "sqlite+pysqlite"):
+            engines = sqlite.open_sqlite(parsed, write_json, read_json)
+        elif parsed.drivername in postgresql.DRIVER_NAMES:
+            engines = postgresql.open_postgresql(parsed, write_json, read_json)
+        else:
+            raise UnsupportedDatabase(
+                str(parsed), f"{parsed.drivername} is not supported, only sqlite and postgresql"
+            )
+        self.url = url if parsed.password is None else _without_password(parsed)
+        self.environment: Mapping[str, str] = engines.environment
+        self.shared = engines.shared
         self.write_engine: Engine = engines.write
         self.read_engine: Engine = engines.read
         self._migration_engine = engines.migrate
-        self._writer = _writer_lock(engines.lock_name)
+        self._writers = _writers_of(engines)
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
-        """Open the write transaction; it has the write lock from its first statement on.
+        """Open a write transaction.
 
-        Other threads of the process wait without a limit, other processes 10 seconds.
+        With SQLite it has the write lock from its first statement on; other threads of the process wait
+        without a limit, other processes 10 seconds. With PostgreSQL each statement sees what others have
+        committed before it: what is read in order to be changed has to be locked.
 
         Raises
         ------
         NestedWrite
             If this thread is inside a write transaction of this database already.
         sqlalchemy.exc.OperationalError
-            If another process keeps the write lock for longer than 10 seconds.
+            If another process keeps the write lock for longer than 10 seconds, or the server went away. Then
+            it is not known whether the last commit was made.
         """
-        with self._writer.hold(), self.write_engine.begin() as connection:
+        with self._writers.hold(), self.write_engine.begin() as connection:
             yield connection
 
     @contextmanager
@@ -124,15 +159,22 @@ class Database:
     def size(self) -> int:
         """Return how many bytes the database has, without what is not yet moved from its log."""
         with self.read() as connection:
-            pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
-            page_bytes = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
-        return int(pages * page_bytes)
+            return postgresql.size(connection) if self.shared else sqlite.size(connection)
+
+    def take_turn(self, connection: Connection, name: str) -> None:
+        """Let transactions that take the same turn follow one another; where all do so, nothing happens."""
+        if self.shared:
+            postgresql.take_turn(connection, name)
+
+    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
+        """Open a channel of short messages between the processes that share the database."""
+        return Announcements(self.write_engine.url, channel, heard)
 
     def migrate(self, script_location: Path, version_table: str) -> None:
         """Bring tables to the newest version of an Alembic folder, all of it or nothing.
 
-        Safe when several processes start at once: one migrates, the others wait up to 60 seconds and
-        find nothing left to do.
+        Safe when several processes start at once: one migrates, the others wait (with SQLite up to
+        60 seconds) and find nothing left to do.
 
         Parameters
         ----------
@@ -150,14 +192,15 @@ class Database:
         """
         config = Config()
         config.set_main_option("script_location", str(script_location).replace("%", "%%"))
-        with _migration_lock, self._writer.hold(), self._migration_engine.begin() as connection:
+        with _migration_lock, self._writers.hold(), self._migration_engine.begin() as connection:
+            self.take_turn(connection, version_table)
             config.attributes["connection"] = connection
             config.attributes["version_table"] = version_table
             try:
                 command.upgrade(config, "head")
             except CommandError as error:
                 raise MigrationFailed(str(script_location), str(error)) from error
-            if broken := broken_references(connection):
+            if not self.shared and (broken := sqlite.broken_references(connection)):
                 raise MigrationFailed(str(script_location), "; ".join(broken[:5]))
 
     def dispose(self) -> None:

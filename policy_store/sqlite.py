@@ -15,28 +15,18 @@ from __future__ import annotations
 import sqlite3
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool, QueuePool
 
+from policy_store.engines import Engines
 from policy_store.errors import UnsupportedDatabase
 
 _BUSY_TIMEOUT_S = 10.0
 _MIGRATION_BUSY_TIMEOUT_S = 60.0
 _WAL_RETRY_S = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class Engines:
-    """The engines of one database, and the name under which its writers take turns."""
-
-    write: Engine
-    read: Engine
-    migrate: Engine
-    lock_name: str
 
 
 def open_sqlite(
@@ -79,6 +69,13 @@ def open_sqlite(
         ),
         lock_name=str(path),
     )
+
+
+def size(connection: Connection) -> int:
+    """Return how many bytes the database has, without what is not yet moved from its log."""
+    pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
+    page_bytes = connection.exec_driver_sql("PRAGMA page_size").scalar_one()
+    return int(pages * page_bytes)
 
 
 def broken_references(connection: Connection) -> list[str]:

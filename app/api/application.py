@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
 from asgi_correlation_id import CorrelationIdMiddleware
@@ -27,7 +27,7 @@ from app.api.request_log import RequestLog
 from app.api.routes import algorithms, allocation, examples, jobs, library, operations, plans
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
-from app.jobs.local import LocalExecutor
+from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED, LocalExecutor
 from app.jobs.service import JobService
 from app.library.seeding import seed_library
 from app.settings import Settings
@@ -74,8 +74,8 @@ def create_application(settings: Settings) -> FastAPI:
             service = JobService(
                 database,
                 job_kinds(store, limits),
-                _executor(settings.workers, _WARM_UP, settings),
-                reserve=_executor(1, _WARM_UP_RESERVE, settings),
+                _executor(settings.workers, _WARM_UP, settings, database.environment),
+                reserve=_executor(1, _WARM_UP_RESERVE, settings, database.environment),
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
@@ -114,10 +114,18 @@ def create_application(settings: Settings) -> FastAPI:
     return application
 
 
-def _executor(slots: int, warm_up: str, settings: Settings) -> LocalExecutor:
-    """Make workers that are warm for the largest problems that are taken."""
-    largest = settings.max_uavs, settings.max_targets
-    return LocalExecutor(slots, warm_up=warm_up, warm_up_arguments=largest, log_level=settings.log_level)
+def _executor(slots: int, warm_up: str, settings: Settings, secrets: Mapping[str, str]) -> LocalExecutor:
+    """Make workers that are warm for the largest problems that are taken.
+
+    ``secrets`` are variables under which they can open the database.
+    """
+    return LocalExecutor(
+        slots,
+        warm_up=warm_up,
+        warm_up_arguments=(settings.max_uavs, settings.max_targets),
+        environment={**SINGLE_THREADED, **KEEPS_MEMORY, **secrets},
+        log_level=settings.log_level,
+    )
 
 
 def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -10,6 +11,7 @@ from typing import Any
 from asgi_correlation_id import correlation_id
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import InterfaceError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import compile_path
@@ -20,6 +22,8 @@ from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
 from app.jobs import errors as job_errors
 from policy_store import errors as store_errors
+
+_log = logging.getLogger(__name__)
 
 FORM_TAG = "form:"
 """Begins the tags that tell the forms of a body apart; they are no part of a pointer."""
@@ -36,6 +40,7 @@ _CODES: Mapping[type[Exception], str] = {
     store_errors.InvalidPolicy: "invalid-policy",
 }
 _DRAINING_RETRY_S = 5.0
+_STORE_IS_AWAY = (OperationalError, InterfaceError)
 
 
 def install_error_handlers(application: FastAPI) -> None:
@@ -46,6 +51,8 @@ def install_error_handlers(application: FastAPI) -> None:
     application.add_exception_handler(AllocatorError, _allocator_error)
     for error in _CODES:
         application.add_exception_handler(error, _known_error)
+    for error in _STORE_IS_AWAY:
+        application.add_exception_handler(error, _store_unavailable)
     application.add_exception_handler(Exception, _defect)
 
 
@@ -149,7 +156,21 @@ def _known_error(request: Request, error: Exception) -> Response:
     return problem_response(code, str(error), _instance(request), headers=headers)
 
 
-def _defect(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs the error
+def _store_unavailable(request: Request, error: Exception) -> Response:
+    _log.error("the database does not answer: %s", error)
+    return problem_response(
+        "store-unavailable",
+        "the database does not answer now; whether a request that changes something was carried out is not "
+        "known, unless it comes again with the same Idempotency-Key",
+        _instance(request),
+        headers={"Retry-After": "1"},
+    )
+
+
+def _defect(request: Request, error: Exception) -> Response:  # the server logs the error
+    if isinstance(error, _STORE_IS_AWAY):
+        # Raised in the middleware, where keys are looked up.
+        return _store_unavailable(request, error)
     # This handler runs outside of the middleware that adds these to other responses.
     identifier = correlation_id.get() or ""
     return problem_response(

@@ -50,6 +50,8 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "draining": HTTPStatus.SERVICE_UNAVAILABLE,
     "not-ready": HTTPStatus.SERVICE_UNAVAILABLE,
     "time-limit-exceeded": HTTPStatus.GATEWAY_TIMEOUT,
+    # the database does not answer
+    "store-unavailable": HTTPStatus.SERVICE_UNAVAILABLE,
     # policy_store.errors
     "policy-not-found": HTTPStatus.NOT_FOUND,
     "duplicate-policy": HTTPStatus.CONFLICT,
@@ -149,7 +151,7 @@ def responses(*codes: str) -> dict[int | str, dict[str, Any]]:
     codes
         Problem types that the route can answer with.
     """
-    types: dict[int, list[str]] = {500: ["internal-error"]}
+    types: dict[int, list[str]] = {500: ["internal-error"], 503: ["store-unavailable"]}
     for code in codes:
         types.setdefault(status_of(code).value, []).append(code)
     return {

@@ -48,6 +48,13 @@ class Channel:
             final = end_event(job)
             self._publish(replace(final, id=max(final.id, self._next_id(0.0))))
 
+    def catch_up(self, job: Job) -> None:
+        """Tell of the end of a job of which nothing was told here, or no more than progress."""
+        if self.ended is None and not self._events:
+            final = end_event(job)
+            self._events.append(JobEvent(final.id - 1, "progress", job.progress.as_json()))
+        self.end(job)
+
     def since(self, after: int) -> Iterator[JobEvent]:
         """Return the remembered events with a larger id."""
         return iter([event for event in self._events if event.id > after])
@@ -87,16 +94,16 @@ class Channels:
         if channel is not None:
             channel.end(job)
 
+    def look_again(self, job_id: str) -> None:
+        """Wake those who wait for a job of which something happened elsewhere."""
+        channel = self._known.get(job_id)
+        if channel is not None:
+            channel.ring()
+
     def ring(self) -> None:
         """Wake everybody who waits on any channel, to look again."""
         for channel in list(self._known.values()):
             channel.ring()
-
-
-def replay(job: Job) -> list[JobEvent]:
-    """Return the events of a finished job whose channel is gone: its last progress and its end."""
-    final = end_event(job)
-    return [JobEvent(final.id - 1, "progress", job.progress.as_json()), final]
 
 
 def end_event(job: Job) -> JobEvent:

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from structlog.contextvars import bind_contextvars
 
 from app.jobs.channel import Channels
+from app.jobs.company import Alone, Company
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor
 from app.jobs.housekeeping import Housekeeping
@@ -23,9 +24,10 @@ from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
 from app.jobs.observer import JobObserver
-from app.jobs.owner import is_alive
+from app.jobs.reading import Database
 from app.jobs.run import Run
 from app.jobs.settling import Settling
+from app.jobs.shared import Reactions, Shared
 from app.jobs.store import Claim, JobStore, QueueLimit
 from app.jobs.writer import Writer
 from app.logs import labels
@@ -46,7 +48,7 @@ class Dispatcher:
         The job table.
     owner
         In whose name the store takes jobs.
-    kinds, executor, reserve, max_queued, overrun_grace_s, retention_s, observer
+    kinds, executor, reserve, max_queued, overrun_grace_s, retention_s, observer, lease_s
         As given to :class:`app.jobs.service.JobService`.
     channels
         Who listens to which job.
@@ -65,9 +67,9 @@ class Dispatcher:
         overrun_grace_s: float,
         retention_s: float | None,
         observer: JobObserver,
+        lease_s: float,
     ) -> None:
         self._store = store
-        self._owner = owner
         self._kinds = {kind.name: kind for kind in kinds}
         self._executor, self._reserve = executor, reserve
         self._channels = channels
@@ -81,6 +83,7 @@ class Dispatcher:
         self._last_minute = LastMinute(self._answer_at_once)
         self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
+        self._company = self._company_on(store.database, owner, lease_s)
         self._house = Housekeeping(store, self._writer, self._runs.values, self._look_after, retention_s)
         self._housekeeping: asyncio.Task[None] | None = None
         self._unsettled: list[Run] = []
@@ -95,6 +98,7 @@ class Dispatcher:
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work."""
         await self._writer.write(self._store.migrate)
+        await self._company.join()
         await self._recover()
         for lane in LANES:
             durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
@@ -130,6 +134,7 @@ class Dispatcher:
         self._house.end()
         if self._housekeeping is not None:
             await self._housekeeping
+        await self._company.leave()
         await self._executor.close()
         if self._reserve is not None:
             await self._reserve.close()
@@ -185,7 +190,6 @@ class Dispatcher:
             self._begin(claim)
         elif created:
             self._waits(claim.job, claim.deadline)
-            self._wake.set()
         elif run_now:
             self._give_back(lane)
             self._wake.set()
@@ -209,11 +213,13 @@ class Dispatcher:
         job, before = await self._writer.write(self._store.cancel, job_id)
         if before is JobStatus.QUEUED:
             self._waits_no_more(job)
+            self._wake.set()
             self._tell_end(job, None)
         run = self._runs.get(job_id)
-        if before is JobStatus.RUNNING and run is not None and run.execution is not None:
-            run.execution.cancel()
-            run.timers.append(asyncio.get_running_loop().call_later(self._grace_s, run.kill, "cancel"))
+        if before is JobStatus.RUNNING and run is not None:
+            run.stop(self._grace_s)
+        elif before is JobStatus.RUNNING:
+            self._company.tell_cancelled(job_id)
         return self.newest(job)
 
     def load(self) -> Load:
@@ -259,9 +265,10 @@ class Dispatcher:
                     self._begin(claim)
 
     def _waits(self, job: Job, deadline: float | None) -> None:
-        """Take note of one more job that waits."""
+        """Take note of one more job that waits, and tell the others who could take it."""
         self._lanes.waiting[job.lane] += 1
         self._watch(job.id, job.kind, deadline)
+        self._company.tell_waiting(job.lane)
 
     def _watch(self, job_id: str, kind: str, deadline: float | None) -> None:
         known = self._kinds.get(kind)
@@ -269,7 +276,9 @@ class Dispatcher:
             self._last_minute.watch(job_id, deadline)
 
     def _waits_no_more(self, job: Job) -> None:
-        self._lanes.waiting[job.lane] = max(0, self._lanes.waiting[job.lane] - 1)
+        # Where others submit too, nothing waits only once nothing was found.
+        least = int(self._company.others_may_wait)
+        self._lanes.waiting[job.lane] = max(least, self._lanes.waiting[job.lane] - 1)
         self._last_minute.forget(job.id)
 
     async def _answer_at_once(self, job_id: str) -> bool:
@@ -338,6 +347,9 @@ class Dispatcher:
             self._tell_end(job, took)
         elif job is not None:
             self._waits(job, run.deadline)
+        else:
+            # It goes on elsewhere: who listens has to look there.
+            run.channel.ring()
         if not run.at_once:
             self._give_back(run.job.lane)
         self._wake.set()
@@ -346,6 +358,7 @@ class Dispatcher:
         """Tell everybody who is interested that a job has ended."""
         self._labels.pop(job.id, None)
         self._channels.end(job)
+        self._company.tell_ended(job.id)
         self._observer.ended(job, ran_s)
         _log.info(
             "job ended",
@@ -376,9 +389,7 @@ class Dispatcher:
         self._wake.set()
 
     async def _recover(self) -> None:
-        changed = await self._writer.write(
-            self._store.recover, tuple(self._kinds), lambda owner: is_alive(owner, self._owner)
-        )
+        changed = await self._writer.write(self._store.recover, tuple(self._kinds), self._company.is_alive)
         for job in changed:
             _log.warning(
                 "a job was left behind by an earlier process",
@@ -386,10 +397,36 @@ class Dispatcher:
             )
             if job.status.finished:
                 self._tell_end(job, None)
+            else:
+                self._company.tell_waiting(job.lane)
         waiting = await self._writer.write(self._store.waiting)
         self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
         for job_id, kind, deadline in await self._writer.write(self._store.deadlines):
             self._watch(job_id, kind, deadline)
+
+    def _company_on(self, database: Database, owner: str, lease_s: float) -> Company:
+        if not database.shared:
+            return Alone(owner)
+
+        def look_for_work(lane: Lane) -> None:
+            self._lanes.waiting[lane] = max(1, self._lanes.waiting[lane])
+            self._wake.set()
+
+        reactions = Reactions(
+            look_for_work, lambda run: run.stop(self._grace_s), self._release_forgotten, self._look_after
+        )
+        return Shared(database, owner, lease_s, self._writer, self._runs, self._channels, reactions)
+
+    async def _release_forgotten(self, job_id: str, attempt: int) -> None:
+        """Put back a job that was taken in a commit of which this service never learned."""
+        if any(run.job.id == job_id for run in self._unsettled):
+            return
+        job = await self._writer.write(self._store.release, job_id, attempt, Progress())
+        if job is not None and job.status.finished:
+            self._tell_end(job, None)
+        elif job is not None:
+            self._company.tell_waiting(job.lane)
+            await self._look_after()
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol
@@ -15,8 +16,21 @@ from app.jobs.tables import artifacts, jobs
 from app.jobs.transitions import find, job_of, select_jobs
 
 
+class Announcements(Protocol):
+    """Short messages between the services that share a database; one may get lost."""
+
+    def tell(self, message: str) -> None:
+        """Send a message soon; never blocks."""
+
+    def close(self) -> None:
+        """End; what was told is sent if that is possible."""
+
+
 class Database(Protocol):
-    """What the jobs room needs of a database; transactions that write take turns."""
+    """What the jobs room needs of a database."""
+
+    shared: bool
+    """Whether several services may work on it; otherwise transactions that write take turns."""
 
     def write(self) -> AbstractContextManager[Connection]:
         """Open a write transaction, committed at its end and rolled back by an exception."""
@@ -27,6 +41,12 @@ class Database(Protocol):
     def migrate(self, script_location: Path, version_table: str) -> None:
         """Bring the tables of an Alembic folder to its newest version."""
 
+    def take_turn(self, connection: Connection, name: str) -> None:
+        """Let the transactions that call this with one name follow one another."""
+
+    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
+        """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
+
 
 class JobReader:
     """Reads the job table; nothing here changes it, or waits for one who does.
@@ -35,10 +55,15 @@ class JobReader:
     ----------
     database
         Where the tables are.
+
+    Attributes
+    ----------
+    database
+        The same.
     """
 
     def __init__(self, database: Database) -> None:
-        self._database = database
+        self.database = self._database = database
 
     def get(self, job_id: str) -> Job:
         """Return a job.

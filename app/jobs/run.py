@@ -10,8 +10,9 @@ from app.jobs.channel import Channel
 from app.jobs.executor import Execution
 from app.jobs.model import Job, Progress
 
-Reason = Literal["time", "cancel", "stop"]
-"""Why a worker was killed: its work did not end with its time, or its cancellation, or the service."""
+Reason = Literal["time", "cancel", "stop", "gone"]
+"""Why a worker was killed: its work did not end with its time, or its cancellation, or the service; or the
+job is no longer this service's."""
 
 
 @dataclass(slots=True, eq=False)
@@ -34,6 +35,8 @@ class Run:
         Why its worker was killed, if it was.
     timers
         What would kill it later.
+    asked_to_stop
+        Whether somebody cancelled it.
     """
 
     job: Job
@@ -46,6 +49,14 @@ class Run:
     execution: Execution | None = None
     killed_for: Reason | None = None
     timers: list[asyncio.TimerHandle] = field(default_factory=list)
+    asked_to_stop: bool = False
+
+    def stop(self, grace_s: float) -> None:
+        """Ask the work to stop by itself, and end its worker if it has not after so many seconds."""
+        if self.execution is not None and not self.asked_to_stop:
+            self.asked_to_stop = True
+            self.execution.cancel()
+            self.timers.append(asyncio.get_running_loop().call_later(grace_s, self.kill, "cancel"))
 
     def kill(self, reason: Reason) -> None:
         """End the worker, for the first reason that is given."""

@@ -8,17 +8,19 @@ from collections.abc import AsyncIterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from app.jobs.channel import Channels, replay, rung
+from app.jobs.channel import Channels, rung
 from app.jobs.dispatcher import Dispatcher
 from app.jobs.executor import Executor
-from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, Load
+from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, JobStatus, Load, Progress
 from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
 from app.jobs.reading import Database
 from app.jobs.store import JobStore
 
-# Who waits for a job that another process runs is not told of its end, and looks at the table.
+# Who waits for a job that another process runs may miss what is told of its end, and looks at the table.
 _LOOK_AGAIN_S = 5.0
+# Its progress is told by nobody: who wants to see that looks as often as it is stored.
+_LOOK_FOR_PROGRESS_S = 1.0
 
 
 class JobService:
@@ -26,7 +28,7 @@ class JobService:
 
     A job is committed before :meth:`submit` returns, and from then on it is finished once, whatever dies:
     what runs when its worker or this process dies waits again, ``max_attempts`` times. One service at a
-    time works on a database.
+    time works on an SQLite file; on PostgreSQL several share the jobs, on one machine or many.
 
     Parameters
     ----------
@@ -49,6 +51,8 @@ class JobService:
         How long ended jobs are kept, with what they left and their idempotency keys; None: for ever.
     observer
         Told of jobs as they begin and end.
+    lease_s
+        On a shared database, how long a service that gives no sign of life counts as alive.
     """
 
     def __init__(
@@ -63,6 +67,7 @@ class JobService:
         overrun_grace_s: float = 5.0,
         retention_s: float | None = None,
         observer: JobObserver | None = None,
+        lease_s: float = 15.0,
     ) -> None:
         owner = new_owner()
         dropped_fields = {kind.name: kind.dropped_fields for kind in kinds}
@@ -79,6 +84,7 @@ class JobService:
             overrun_grace_s=overrun_grace_s,
             retention_s=retention_s,
             observer=observer or NoObserver(),
+            lease_s=lease_s,
         )
         self._stopping = False
         self._stopped = False
@@ -208,7 +214,7 @@ class JobService:
             if channel.ended is None and not self._dispatcher.runs(job_id):
                 job = await self.get(job_id)
                 if job.status.finished:
-                    return job
+                    channel.catch_up(job)
             if channel.ended is not None:
                 return channel.ended
             left = _LOOK_AGAIN_S if end is None else min(_LOOK_AGAIN_S, end - time.monotonic())
@@ -226,23 +232,28 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
+        seen: Progress | None = None
         channel = self._channels.open(job_id)
         while True:
             bell = channel.changed
-            if channel.ended is None and not self._dispatcher.runs(job_id):
+            elsewhere = channel.ended is None and not self._dispatcher.runs(job_id)
+            if elsewhere:
                 job = await self.get(job_id)
-                if job.status.finished and channel.ended is None:
-                    for event in replay(job):
-                        if event.id > after:
-                            yield event
-                    return
+                # While that was read, it may have begun to run here, or what is read may be of before.
+                elsewhere = channel.ended is None and not self._dispatcher.runs(job_id)
+                if elsewhere and job.status.finished:
+                    channel.catch_up(job)
+                elif elsewhere and job.status is JobStatus.RUNNING:
+                    if job.progress not in (seen, channel.progress):
+                        channel.report(job.progress)
+                    seen = job.progress
             ended = channel.ended is not None
             for event in channel.since(after):
                 after = event.id
                 yield event
             if ended or self._stopping:
                 return
-            await rung(bell, _LOOK_AGAIN_S)
+            await rung(bell, _LOOK_FOR_PROGRESS_S if elsewhere else _LOOK_AGAIN_S)
 
     def load(self) -> Load:
         """Return how busy the service is; it answers quickly once a worker is ready."""

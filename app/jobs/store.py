@@ -45,6 +45,7 @@ from app.jobs.transitions import (
     queued_of_other_kinds,
     requeue,
     select_jobs,
+    select_jobs_to_change,
 )
 
 MIGRATIONS = Path(__file__).parent / "migrations"
@@ -132,10 +133,12 @@ class JobStore(JobReader):
         now = time.time()
         with self._database.write() as connection:
             if idempotency is not None:
+                self._database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
                 known = self._known(connection, idempotency)
                 if known is not None:
                     return known, False
             if not run_now:
+                self._database.take_turn(connection, f"queue {kind.lane}")
                 waiting = connection.scalar(
                     sa.select(sa.func.count()).where(
                         jobs.c.status == JobStatus.QUEUED, jobs.c.lane == kind.lane
@@ -193,6 +196,8 @@ class JobStore(JobReader):
             .where(jobs.c.status == JobStatus.QUEUED, jobs.c.lane == lane)
             .order_by(jobs.c.number)
             .limit(1)
+            # One that another dispatcher is about to take is passed over, where they do not take turns.
+            .with_for_update(skip_locked=True)
             .scalar_subquery()
         )
         return self._take(jobs.c.number == oldest)
@@ -303,12 +308,13 @@ class JobStore(JobReader):
         if not dead and not strangers:
             return []
         with self._database.write() as connection:
-            lost = select_jobs.where(jobs.c.status == JobStatus.RUNNING, jobs.c.owner.in_(dead))
+            lost = select_jobs_to_change.where(jobs.c.status == JobStatus.RUNNING, jobs.c.owner.in_(dead))
             for row in connection.execute(lost).mappings().all():
                 changed.append(
                     self._lose(connection, row, "the service stopped in its midst", progress_of(row))
                 )
-            for row in connection.execute(queued_of_other_kinds(kinds)).mappings().all():
+            unknown = queued_of_other_kinds(kinds).with_for_update(of=jobs)
+            for row in connection.execute(unknown).mappings().all():
                 error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
                 changed.append(self._end(connection, row, JobStatus.FAILED, progress_of(row), error=error))
         return changed
@@ -341,7 +347,7 @@ class JobStore(JobReader):
             If no job has that id.
         """
         with self._database.write() as connection:
-            row = find(connection, job_id)
+            row = find(connection, job_id, to_change=True)
             if row["status"] == JobStatus.QUEUED:
                 return self._end(connection, row, JobStatus.CANCELLED, progress_of(row)), JobStatus.QUEUED
             if row["status"] == JobStatus.RUNNING:

@@ -13,7 +13,9 @@ metadata = sa.MetaData()
 jobs = sa.Table(
     "jobs",
     metadata,
-    sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column(
+        "number", sa.BigInteger().with_variant(sa.Integer, "sqlite"), primary_key=True, autoincrement=True
+    ),
     sa.Column("id", sa.String(32), nullable=False, unique=True),
     sa.Column("kind", sa.String(64), nullable=False),
     sa.Column("lane", sa.String(16), nullable=False),
@@ -52,4 +54,12 @@ idempotency_keys = sa.Table(
     sa.Column(
         "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False, index=True
     ),
+)
+
+# Where several services share a database: when each gave its last sign of life, by the database's clock.
+owners = sa.Table(
+    "job_owners",
+    metadata,
+    sa.Column("owner", sa.String(255), primary_key=True),
+    sa.Column("seen_at", sa.Double, nullable=False),
 )

@@ -16,17 +16,20 @@ from app.jobs.tables import artifacts, jobs
 
 has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
 select_jobs = sa.select(jobs, has_artifact)
+# What is read in order to be changed is locked, where a database does not let writers take turns.
+select_jobs_to_change = select_jobs.with_for_update(of=jobs)
 
 
-def find(connection: Connection, job_id: str) -> RowMapping:
-    """Return the row of a job.
+def find(connection: Connection, job_id: str, *, to_change: bool = False) -> RowMapping:
+    """Return the row of a job; if it is to be changed, nothing can come between it and the commit.
 
     Raises
     ------
     JobNotFound
         If no job has that id.
     """
-    row = connection.execute(select_jobs.where(jobs.c.id == job_id)).mappings().first()
+    select = select_jobs_to_change if to_change else select_jobs
+    row = connection.execute(select.where(jobs.c.id == job_id)).mappings().first()
     if row is None:
         raise JobNotFound(job_id)
     return row
@@ -36,7 +39,7 @@ def find_attempt(connection: Connection, job_id: str, attempt: int) -> RowMappin
     """Return the row if the job is still in this attempt; nothing can come between it and the commit."""
     return (
         connection.execute(
-            select_jobs.where(
+            select_jobs_to_change.where(
                 jobs.c.id == job_id, jobs.c.attempt == attempt, jobs.c.status == JobStatus.RUNNING
             )
         )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import ParamSpec, TypeVar
 
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import InterfaceError, OperationalError
 
 _ATTEMPTS, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
 
@@ -32,12 +32,12 @@ class Writer:
         return await loop.run_in_executor(self._thread, lambda: function(*args, **kwargs))
 
     async def write_surely(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Write what must not be lost: a database that is locked or full is tried again for a while."""
+        """Write what must not be lost: a database that is locked, full or away is tried again for a while."""
         pause = _FIRST_PAUSE_S
         for _ in range(_ATTEMPTS - 1):
             try:
                 return await self.write(function, *args, **kwargs)
-            except OperationalError:
+            except (OperationalError, InterfaceError):
                 _log.exception("the database could not be written; next try in %.1f s", pause)
                 await asyncio.sleep(pause)
                 pause = min(2 * pause, _LONGEST_PAUSE_S)

@@ -15,6 +15,8 @@ from app.jobs.service import JobService
 from policy_store.database import Database
 
 PATIENCE_S = 30.0
+# Of services that share a database: short, because tests wait for it where one was killed.
+LEASE_S = 1.5
 
 
 def count_completion(connection: sa.Connection, job: Job, work: WorkResult) -> dict[str, Any]:
@@ -32,6 +34,7 @@ GATED = JobKind("gated", "job_work:until_file", "interactive", count_completion)
 KINDS = (
     *(kind(name) for name in ("echo", "until_file", "until_stopped", "deaf", "chatter", "epochs", "die")),
     *(kind(name) for name in ("refuse", "defect", "leave", "not_json", "surroundings", "speak")),
+    kind("note"),
     JobKind("train", "job_work:until_file", "training"),
     GATED,
 )
@@ -48,9 +51,9 @@ def url_of(folder: Path) -> str:
 
 
 @asynccontextmanager
-async def running(folder: Path, *, grace_s: float = 0.0, **settings: Any) -> AsyncIterator[JobService]:
-    """Run a service on the database of a folder, with all workers warm."""
-    database = Database(url_of(folder))
+async def running(where: Path | str, *, grace_s: float = 0.0, **settings: Any) -> AsyncIterator[JobService]:
+    """Run a service on the database of a folder, or of a URL, with all workers warm."""
+    database = Database(where if isinstance(where, str) else url_of(where))
     service = make_service(database, **settings)
     await service.start()
     try:

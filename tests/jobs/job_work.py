@@ -22,6 +22,13 @@ def echo(payload: Payload, context: WorkContext) -> WorkResult:
     return WorkResult({"echo": payload, "pid": os.getpid()}, artifact.encode() if artifact else None)
 
 
+def note(payload: Payload, context: WorkContext) -> WorkResult:
+    """Write a line with the payload's number into a file: it is there as often as this was done."""
+    with Path(payload["log"]).open("a") as lines:
+        lines.write(f"{payload['number']}\n")
+    return WorkResult({"pid": os.getpid()})
+
+
 def until_file(payload: Payload, context: WorkContext) -> WorkResult:
     """Report the process id as the epoch, and end when the file is there."""
     context.report(Progress(0.25, epoch=os.getpid()))

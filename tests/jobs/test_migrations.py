@@ -2,17 +2,17 @@
 
 import time
 
+import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
-from harness import url_of
 
 from app.jobs.model import JobKind, Progress, WorkResult
 from app.jobs.store import MIGRATIONS, VERSION_TABLE, JobStore, QueueLimit
 from policy_store.database import Database
 
 
-def test_a_database_of_the_first_version_is_brought_forward(tmp_path):
-    database = Database(url_of(tmp_path))
+def test_a_database_of_the_first_version_is_brought_forward(any_database_url):
+    database = Database(any_database_url)
     config = Config()
     config.set_main_option("script_location", str(MIGRATIONS))
     with database.write() as connection:
@@ -28,9 +28,7 @@ def test_a_database_of_the_first_version_is_brought_forward(tmp_path):
     assert store.get(ended.id) == ended
     assert store.artifact(ended.id) == b"weights"
     with database.read() as connection:
-        names = (
-            connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'index'").scalars().all()
-        )
-    assert "ix_jobs_finished_at" in names
+        indexes = sa.inspect(connection).get_indexes("jobs")
+    assert "ix_jobs_finished_at" in {index["name"] for index in indexes}
     assert store.expire(time.time() + 1, 1) == 1
     database.dispose()

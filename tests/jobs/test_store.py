@@ -25,8 +25,8 @@ SOME = Progress(0.5, best_reward=1.5)
 
 
 @pytest.fixture
-def database(tmp_path):
-    database = Database(url_of(tmp_path))
+def database(any_database_url):
+    database = Database(any_database_url)
     yield database
     database.dispose()
 

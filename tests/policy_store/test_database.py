@@ -153,8 +153,14 @@ def test_databases_that_cannot_be_used_are_refused(url: str) -> None:
 
 def test_a_password_is_not_shown() -> None:
     with pytest.raises(UnsupportedDatabase) as refused:
-        Database("postgresql://user:secret@host/name")
+        Database("mysql://user:secret@host/name")
     assert "secret" not in str(refused.value)
+
+
+def test_a_password_is_no_part_of_what_is_written_down() -> None:
+    database = Database("postgresql://user:secret@host:5433/name?sslmode=require")
+    assert database.url == "postgresql://user@host:5433/name?sslmode=require"
+    assert database.environment == {"PGPASSWORD": "secret"}
 
 
 @pytest.mark.parametrize("ending", ["_exit", "SIGKILL"])

@@ -24,6 +24,11 @@ from policy_store.vector_cache import VectorCache
 SPACE = "task-description-1/5x10x3"
 
 
+@pytest.fixture
+def url(any_database_url: str) -> str:
+    return any_database_url
+
+
 def rows(database: Database, table) -> int:
     with database.read() as connection:
         return connection.execute(select(func.count()).select_from(table)).scalar_one()

@@ -1,0 +1,71 @@
+"""Whether other services work on the same job table, and what a dispatcher then has to do with them.
+
+On SQLite a service is :class:`Alone`; on a shared database it is in the company of others, see
+:class:`app.jobs.shared.Shared`.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from app.jobs.model import Lane
+from app.jobs.owner import is_alive
+
+
+class Company(Protocol):
+    """The other services, as the dispatcher deals with them; called on the event loop where not said."""
+
+    others_may_wait: bool
+    """Whether there may be waiting jobs that this service has not heard of."""
+
+    async def join(self) -> None:
+        """Begin, before the first job is taken."""
+
+    async def leave(self) -> None:
+        """End, after the last job was settled or put back."""
+
+    def is_alive(self, owner: str) -> bool:
+        """Say whether an owner can still finish its jobs. Blocks; called in the thread that writes."""
+
+    def tell_waiting(self, lane: Lane) -> None:
+        """Tell that a job waits in a lane."""
+
+    def tell_ended(self, job_id: str) -> None:
+        """Tell that a job has ended."""
+
+    def tell_cancelled(self, job_id: str) -> None:
+        """Tell that a job, which runs elsewhere, should stop."""
+
+
+class Alone:
+    """There are no others: an owner that is not this one is alive if its process is.
+
+    Parameters
+    ----------
+    owner
+        This service.
+    """
+
+    others_may_wait = False
+
+    def __init__(self, owner: str) -> None:
+        self._owner = owner
+
+    async def join(self) -> None:
+        """Do nothing."""
+
+    async def leave(self) -> None:
+        """Do nothing."""
+
+    def is_alive(self, owner: str) -> bool:
+        """Say whether the process of an owner lives, on this machine."""
+        return is_alive(owner, self._owner)
+
+    def tell_waiting(self, lane: Lane) -> None:
+        """Tell nobody."""
+
+    def tell_ended(self, job_id: str) -> None:
+        """Tell nobody."""
+
+    def tell_cancelled(self, job_id: str) -> None:
+        """Tell nobody."""

@@ -1,0 +1,277 @@
+"""Several services on one PostgreSQL database: jobs are done by all, and none is done twice or lost."""
+
+import asyncio
+import subprocess
+import sys
+from collections import Counter
+from contextlib import asynccontextmanager
+from pathlib import Path
+from signal import SIGINT, SIGKILL, SIGQUIT
+
+import pytest
+import sqlalchemy as sa
+from harness import GATED, KINDS, LEASE_S, PATIENCE_S, eventually, finished, reports, running
+from postgresql_server import PostgresqlServer
+from sqlalchemy.exc import OperationalError
+
+from app.jobs.errors import QueueFull
+from app.jobs.lease import Lease
+from app.jobs.model import Idempotency, JobKind, JobStatus
+from app.jobs.store import JobStore, QueueLimit
+from policy_store.database import Database
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def url(postgresql):
+    return postgresql.new_database()
+
+
+@asynccontextmanager
+async def two_services(url, **settings):
+    options = {"lease_s": LEASE_S, "max_queued": 1000, **settings}
+    async with running(url, **options) as one, running(url, **options) as other:
+        yield one, other
+
+
+def make_completions(url):
+    """Make the table in which the harness counts completions, before several services would at once."""
+    database = Database(url)
+    with database.write() as connection:
+        connection.execute(sa.text("CREATE TABLE completions (job_id TEXT)"))
+    database.dispose()
+
+
+def completions_of(url):
+    database = Database(url)
+    with database.read() as connection:
+        found = connection.scalars(sa.text("SELECT job_id FROM completions")).all()
+    database.dispose()
+    return found
+
+
+def test_a_service_works_on_what_another_has_taken_in_and_its_callers_are_told(url, tmp_path):
+    async def scenario():
+        async with two_services(url) as (one, other):
+            gate = tmp_path / "gate"
+            mine, _ = await one.submit("until_file", {"path": str(gate)})
+            theirs, _ = await one.submit("until_file", {"path": str(gate)})
+            await reports(one, mine)
+            # Seen in the table, where the other stores it.
+            await reports(one, theirs)
+            waiting = [asyncio.ensure_future(finished(one, job)) for job in (mine, theirs)]
+            events = asyncio.ensure_future(anext(one.events(theirs.id)))
+            assert (await events).data["fraction"] == 0.25
+            gate.touch()
+            pids = {(await ended).result["pid"] for ended in waiting}
+            assert len(pids) == 2
+            assert (await other.get(mine.id)).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
+def test_two_dispatchers_never_do_a_job_twice(url, tmp_path):
+    async def scenario():
+        log = tmp_path / "log"
+        async with two_services(url, slots=2) as services:
+            taken = await asyncio.gather(
+                *(
+                    services[number % 2].submit("note", {"log": str(log), "number": number})
+                    for number in range(200)
+                )
+            )
+            done = [await finished(services[(number + 1) % 2], job) for number, (job, _) in enumerate(taken)]
+        assert {job.status for job in done} == {JobStatus.SUCCEEDED}
+        assert {job.attempt for job in done} == {1}
+        assert Counter(log.read_text().split()) == Counter(map(str, range(200)))
+
+    asyncio.run(scenario())
+
+
+def test_a_job_is_cancelled_from_another_service(url):
+    async def scenario():
+        async with two_services(url) as (one, other):
+            job, _ = await one.submit("until_stopped", {})
+            await reports(one, job)
+            assert (await other.cancel(job.id)).status is JobStatus.RUNNING
+            ended = await finished(other, job)
+            assert (ended.status, ended.result["cancelled"]) == (JobStatus.CANCELLED, True)
+            assert await one.get(job.id) == ended
+
+    asyncio.run(scenario())
+
+
+def test_one_key_makes_one_job_and_the_queue_has_one_limit_for_all(url, tmp_path):
+    async def scenario():
+        gate = tmp_path / "gate"
+        async with two_services(url, max_queued=3) as services:
+            for service in services:
+                job, _ = await service.submit("until_file", {"path": str(gate)})
+                await reports(service, job)
+            keyed = await asyncio.gather(
+                *(
+                    services[number % 2].submit("echo", {}, idempotency=Idempotency("me", "key", "hash"))
+                    for number in range(8)
+                )
+            )
+            assert len({job.id for job, _ in keyed}) == 1
+            assert [created for _, created in keyed].count(True) == 1
+            answers = await asyncio.gather(
+                *(services[number % 2].submit("echo", {}) for number in range(10)), return_exceptions=True
+            )
+            assert sum(isinstance(answer, QueueFull) for answer in answers) == 8
+            gate.touch()
+            for answer in answers:
+                if not isinstance(answer, QueueFull):
+                    assert (await finished(services[0], answer[0])).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
+def test_what_a_killed_service_ran_is_done_by_the_others(url, tmp_path):
+    make_completions(url)
+    gate = tmp_path / "gate"
+    process = subprocess.Popen(
+        [sys.executable, str(HERE / "service_process.py"), url, str(gate), "6"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=HERE.parents[1],
+        env={"PYTHONPATH": f"{HERE.parents[1]}:{HERE}"},
+    )
+    lines = [process.stdout.readline().split() for _ in range(7)]
+    accepted = [line[1] for line in lines if line[0] == "accepted"]
+    assert len(accepted) == 6
+    process.send_signal(SIGKILL)
+    process.wait()
+    process.stdout.close()
+    gate.touch()
+
+    async def scenario():
+        async with running(url, kinds=(GATED,), lease_s=LEASE_S) as service:
+            done = [await service.wait(job_id, PATIENCE_S) for job_id in accepted]
+        assert {job.status for job in done} == {JobStatus.SUCCEEDED}
+        assert sorted(job.attempt for job in done) == [1, 1, 1, 1, 2, 2]
+
+    asyncio.run(scenario())
+    assert sorted(completions_of(url)) == sorted(accepted)
+
+
+@pytest.mark.parametrize("how", [SIGINT, SIGQUIT])
+def test_a_restart_of_the_database_loses_nothing(how, tmp_path):
+    server = PostgresqlServer()
+    try:
+        url = server.new_database()
+        make_completions(url)
+        counted = JobKind("counted", "job_work:note", "interactive", GATED.on_success)
+
+        async def submit(service, number):
+            """Submit as a client does that comes again with its key while the service cannot store."""
+            while True:
+                try:
+                    return await service.submit(
+                        "counted",
+                        {"log": str(tmp_path / "log"), "number": number},
+                        idempotency=Idempotency("client", str(number), ""),
+                    )
+                except OperationalError:
+                    await asyncio.sleep(0.05)
+
+        async def scenario():
+            async with two_services(url, kinds=(*KINDS, counted)) as services:
+                gate = asyncio.Event()
+
+                async def client(number):
+                    if number >= 60:
+                        await gate.wait()
+                    return await submit(services[number % 2], number)
+
+                clients = [asyncio.ensure_future(client(number)) for number in range(200)]
+                await eventually(lambda: len(completions_of(url)) >= 20)
+                gate.set()
+                await asyncio.to_thread(server.restart, how)
+                jobs = [(await each)[0] for each in clients]
+                for number, job in enumerate(jobs):
+                    assert (await wait(services[(number + 1) % 2], job)).status is JobStatus.SUCCEEDED
+                return jobs
+
+        async def wait(service, job):
+            while True:
+                try:
+                    return await finished(service, job)
+                except OperationalError:
+                    await asyncio.sleep(0.05)
+
+        jobs = asyncio.run(scenario())
+        assert sorted(completions_of(url)) == sorted(job.id for job in jobs)
+    finally:
+        server.close()
+
+
+def test_nobody_is_judged_before_all_had_the_time_to_show_themselves(url):
+    now = [1000.0]
+    database = Database(url)
+    JobStore(database, "a", 3).migrate()
+    judge, other = (Lease(database, name, 10.0, clock=lambda: now[0]) for name in ("judge", "other"))
+
+    def pass_time(seconds):
+        now[0] += seconds
+        with database.write() as connection:
+            connection.execute(sa.text(f"UPDATE job_owners SET seen_at = seen_at - {seconds}"))
+
+    assert other.show() == {}
+    judge.show()
+    # A newcomer does not know for how long the others could not show themselves.
+    assert judge.is_alive("other")
+    assert judge.is_alive("never seen")
+    for _ in range(3):
+        pass_time(4.0)
+        judge.show()
+    assert not judge.is_alive("other")
+    assert not judge.is_alive("never seen")
+    other.show()
+    assert judge.is_alive("other")
+    # The database was away for long: all look dead, and all get a lease's time.
+    pass_time(60.0)
+    judge.show()
+    assert judge.is_alive("other")
+    other.show()
+    for _ in range(3):
+        pass_time(4.0)
+        judge.show()
+        other.show()
+    assert judge.is_alive("other")
+    other.end()
+    assert not judge.is_alive("other")
+    database.dispose()
+
+
+def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(url):
+    async def scenario():
+        async with running(url, lease_s=LEASE_S) as service:
+            # As if the commit of a job that begins as running had been made and its confirmation lost.
+            store = service._store
+            kind = next(kind for kind in KINDS if kind.name == "echo")
+            claim, _ = await asyncio.to_thread(
+                store.insert, kind, {"n": 1}, run_now=True, limit=QueueLimit(1, 1.0)
+            )
+            done = await finished(service, claim.job)
+            assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
+
+    asyncio.run(scenario())
+
+
+def test_a_service_that_was_taken_for_dead_gives_up_its_work(url, tmp_path):
+    async def scenario():
+        async with two_services(url) as (one, other):
+            job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
+            await reports(one, job)
+            # As another service does that has not seen this one for too long.
+            lost = await asyncio.to_thread(other._store.recover, ["until_file"], lambda owner: False)
+            assert [each.id for each in lost] == [job.id]
+            await eventually(lambda: one.load().restarts == 1)
+            (tmp_path / "gate").touch()
+            done = await finished(one, job)
+            assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
+
+    asyncio.run(scenario())
