@@ -5,12 +5,14 @@ from __future__ import annotations
 import ipaddress
 import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+OWN_CLUSTER = "local"
 
 _SECONDS_A_DAY = 86_400.0
 
@@ -64,6 +66,18 @@ class Settings(BaseSettings):
         le=256,
         description="Cores that the search of one job keeps busy; workers times this: processors",
     )
+    executor: Literal["local", "ray"] = Field(
+        default="local", description="Where jobs run: `local`, on this machine, or `ray`, on a Ray cluster"
+    )
+    ray_address: str = Field(
+        default=OWN_CLUSTER,
+        description="Head of the Ray cluster, `host:port`; `local`: one of this machine, started for it",
+    )
+    ray_resources: dict[str, Annotated[float, Field(gt=0, allow_inf_nan=False)]] = Field(
+        default_factory=dict,
+        description='What a worker on Ray needs, a JSON object such as `{"CPU": 1, "large": 1}`; default: a '
+        "CPU for each thread of a job",
+    )
     queue_limit: int = Field(
         default=64, ge=0, description="Jobs of a lane that may wait; one more is answered with 429"
     )
@@ -99,6 +113,16 @@ class Settings(BaseSettings):
     max_targets: int = Field(default=2000, ge=1, description="Most rescue areas in a problem")
     max_materials: int = Field(default=64, ge=1, description="Most kinds of material in a problem")
 
+    @model_validator(mode="after")
+    def _workers_reach_the_database(self) -> Self:
+        elsewhere = self.executor == "ray" and self.ray_address != OWN_CLUSTER
+        if elsewhere and self.resolved_database_url.startswith("sqlite"):
+            raise ValueError(
+                "workers on other machines cannot read an SQLite file: with ALLOCATOR_RAY_ADDRESS, "
+                "ALLOCATOR_DATABASE_URL has to name a PostgreSQL database"
+            )
+        return self
+
     @field_validator("cors_origins", mode="before")
     @classmethod
     def _split(cls, given: object) -> object:
@@ -115,6 +139,11 @@ class Settings(BaseSettings):
             return not ipaddress.ip_address(self.host).is_loopback
         except ValueError:
             return True
+
+    @property
+    def worker_resources(self) -> dict[str, float]:
+        """What a worker on Ray needs, the default filled in."""
+        return dict(self.ray_resources) or {"CPU": float(self.threads_per_job)}
 
     @property
     def job_retention_s(self) -> float | None:

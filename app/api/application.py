@@ -27,7 +27,9 @@ from app.api.request_log import RequestLog
 from app.api.routes import algorithms, allocation, examples, jobs, library, operations, plans
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
+from app.jobs.executor import Executor
 from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED, LocalExecutor
+from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.library.seeding import seed_library
 from app.settings import Settings
@@ -74,8 +76,8 @@ def create_application(settings: Settings) -> FastAPI:
             service = JobService(
                 database,
                 job_kinds(store, limits),
-                _executor(settings.workers, _WARM_UP, settings, database.environment),
-                reserve=_executor(1, _WARM_UP_RESERVE, settings, database.environment),
+                _workers(settings, database.environment),
+                reserve=_local(1, _WARM_UP_RESERVE, settings, database.environment),
                 max_queued=settings.queue_limit,
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
@@ -114,15 +116,31 @@ def create_application(settings: Settings) -> FastAPI:
     return application
 
 
-def _executor(slots: int, warm_up: str, settings: Settings, secrets: Mapping[str, str]) -> LocalExecutor:
-    """Make workers that are warm for the largest problems that are taken.
+def _workers(settings: Settings, secrets: Mapping[str, str]) -> Executor:
+    """Make what runs the jobs; ``secrets`` are variables under which it can open the database."""
+    if settings.executor == "local":
+        return _local(settings.workers, _WARM_UP, settings, secrets)
+    return RayExecutor(
+        settings.workers,
+        address=settings.ray_address,
+        resources=settings.worker_resources,
+        warm_up=_WARM_UP,
+        warm_up_arguments=_largest(settings),
+        environment={**SINGLE_THREADED, **KEEPS_MEMORY, **secrets},
+        log_level=settings.log_level,
+    )
 
-    ``secrets`` are variables under which they can open the database.
-    """
+
+def _largest(settings: Settings) -> tuple[int, int]:
+    """Return the size of the largest problems that are taken, for which workers are warm."""
+    return settings.max_uavs, settings.max_targets
+
+
+def _local(slots: int, warm_up: str, settings: Settings, secrets: Mapping[str, str]) -> LocalExecutor:
     return LocalExecutor(
         slots,
         warm_up=warm_up,
-        warm_up_arguments=(settings.max_uavs, settings.max_targets),
+        warm_up_arguments=_largest(settings),
         environment={**SINGLE_THREADED, **KEEPS_MEMORY, **secrets},
         log_level=settings.log_level,
     )

@@ -68,7 +68,7 @@ class _Reporter:
         """Stop reporting the work that ends, and return its last progress."""
         with self._lock:
             self._unsent = None
-            return None if self._latest is None else _clean(self._latest)
+            return None if self._latest is None else clean(self._latest)
 
     def _send(self) -> None:
         while True:
@@ -80,13 +80,13 @@ class _Reporter:
             if progress is None:
                 continue
             try:
-                self._pipe.send((serial, _clean(progress)))
+                self._pipe.send((serial, clean(progress)))
             except OSError:
                 return
             time.sleep(REPORT_INTERVAL_S)
 
 
-def _clean(progress: Progress) -> Progress:
+def clean(progress: Progress) -> Progress:
     """Return a progress of plain JSON numbers: a reward may be minus infinity until a plan is found."""
     reward = progress.best_reward
     plan = progress.assignment

@@ -9,6 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from app.jobs.executor import Executor
 from app.jobs.local import LocalExecutor
 from app.jobs.model import Job, JobKind, JobStatus, WorkResult
 from app.jobs.service import JobService
@@ -41,9 +42,14 @@ KINDS = (
 
 
 def make_service(
-    database: Database, *, kinds: Sequence[JobKind] = KINDS, slots: int = 1, **settings: Any
+    database: Database,
+    *,
+    kinds: Sequence[JobKind] = KINDS,
+    slots: int = 1,
+    executor: Executor | None = None,
+    **settings: Any,
 ) -> JobService:
-    return JobService(database, kinds, LocalExecutor(slots), **settings)
+    return JobService(database, kinds, executor or LocalExecutor(slots), **settings)
 
 
 def url_of(folder: Path) -> str:

@@ -1,0 +1,236 @@
+"""What the dispatcher may rely on, of every executor: on this machine, and on a Ray cluster of two nodes."""
+
+import asyncio
+import os
+import sys
+from collections import Counter
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from harness import KINDS, eventually, finished, running, url_of
+from ray_nodes import RayNodes, ray_is_installed
+
+from app.jobs.executor import Lost, Raised, Returned
+from app.jobs.local import SINGLE_THREADED, LocalExecutor
+from app.jobs.model import JobStatus, Progress
+from app.jobs.ray_cluster import RayExecutor
+from app.jobs.service import JobService
+from policy_store.database import Database
+
+HERE = Path(__file__).parent
+HOW_TO_GET_IT = "no Ray: pip install '.[ray]' (REQUIRE_RAY=1 makes this a failure)"
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+
+
+@pytest.fixture(scope="module")
+def nodes():
+    if not ray_is_installed() and os.environ.get("REQUIRE_RAY") != "1":
+        pytest.skip(HOW_TO_GET_IT)
+    cluster = RayNodes(2)
+    yield cluster
+    cluster.close()
+
+
+@pytest.fixture(params=["local", "ray"])
+def new_executor(request):
+    """Makes executors with two workers."""
+    if request.param == "local":
+        return LocalExecutor
+    return ray_executors(request.getfixturevalue("nodes"))
+
+
+def ray_executors(nodes):
+    path = os.pathsep.join([str(HERE.parents[1]), str(HERE), *sys.path])
+
+    def make(slots, **options):
+        environment = {**SINGLE_THREADED, "PYTHONPATH": path}
+        return RayExecutor(slots, address=nodes.address, environment=environment, **options)
+
+    return make
+
+
+@asynccontextmanager
+async def started(new_executor, **options):
+    executor = new_executor(2, **options)
+    heard = []
+    await executor.start(lambda: heard.append(executor.ready))
+    try:
+        await eventually(lambda: executor.ready == executor.capacity == 2)
+        assert heard == [1, 2]
+        yield executor
+    finally:
+        await executor.close()
+
+
+def submit(executor, work, payload=None, time_left_s=None):
+    """Submit work, and return it with the list of its progresses."""
+    told = []
+    execution = executor.submit(
+        f"job_work:{work}", payload or {}, time_left_s=time_left_s, on_progress=told.append, labels={}
+    )
+    return execution, told
+
+
+def test_results_errors_and_time_come_through(new_executor):
+    async def scenario():
+        async with started(new_executor, warm_up="job_work:warm_up") as executor:
+            done = await submit(executor, "echo", {"n": 1, "artifact": "bytes"})[0].outcome()
+            assert isinstance(done, Returned)
+            assert (done.work.result["echo"]["n"], done.work.artifact) == (1, b"bytes")
+
+            refused = await submit(executor, "refuse")[0].outcome()
+            assert isinstance(refused, Raised)
+            assert refused.error["code"] == "invalid-problem"
+            assert refused.error["violations"] == [
+                {"pointer": "/uavs/0/speed", "detail": "speed is 0, must be > 0"}
+            ]
+            for work, name in (("defect", "ZeroDivisionError"), ("leave", "SystemExit"), ("not_json", "Val")):
+                failed = await submit(executor, work)[0].outcome()
+                assert isinstance(failed, Raised), work
+                assert name in failed.error["detail"]
+                assert work in failed.traceback or work == "not_json"
+
+            surroundings = await submit(executor, "surroundings")[0].outcome()
+            assert surroundings.work.result["threads"] == ["1", "1", "1"]
+            assert surroundings.work.result["warm"]
+
+            late = await submit(executor, "until_stopped", time_left_s=-1.0)[0].outcome()
+            assert late.work.result["best"] == 0
+            assert late.work.result["time_left"] <= 0
+            soon = await submit(executor, "until_stopped", time_left_s=0.2)[0].outcome()
+            assert not soon.work.result["cancelled"]
+            assert soon.work.result["time_left"] <= 0
+            assert executor.restarts == 0
+
+    asyncio.run(scenario())
+
+
+def test_progress_comes_while_work_goes_on_and_the_last_before_the_outcome(new_executor, tmp_path):
+    async def scenario():
+        async with started(new_executor) as executor:
+            execution, told = submit(executor, "epochs", {"folder": str(tmp_path), "epochs": 3})
+            for epoch in (1, 2, 3):
+                (tmp_path / str(epoch)).touch()
+                await eventually(lambda epoch=epoch: bool(told) and told[-1].epoch == epoch)
+            (tmp_path / "end").touch()
+            assert isinstance(await execution.outcome(), Returned)
+            assert told == [Progress(epoch / 3, epoch=epoch) for epoch in (1, 2, 3)]
+
+            execution, told = submit(executor, "until_stopped", time_left_s=0.0)
+            await execution.outcome()
+            assert told == []
+            execution, told = submit(executor, "chatter", {"seconds": 0.5})
+            ended = await execution.outcome()
+            assert told[-1].epoch == ended.work.result["reports"]
+            assert told[-1].fraction == 1.0
+
+    asyncio.run(scenario())
+
+
+def test_work_is_cancelled_wherever_it_is(new_executor):
+    async def scenario():
+        async with started(new_executor) as executor:
+            running_ones = [submit(executor, "until_stopped") for _ in range(2)]
+            waiting, _ = submit(executor, "until_stopped")
+            for _, told in running_ones:
+                await eventually(lambda told=told: bool(told))
+            waiting.cancel()
+            for execution, told in running_ones:
+                execution.cancel()
+                ended = await execution.outcome()
+                assert ended.work.result["cancelled"]
+                assert told[-1].epoch == ended.work.result["best"] > 0
+            assert (await waiting.outcome()).work.result == {"best": 0, "cancelled": True, "time_left": None}
+            # The flag was that work's, not the worker's.
+            soon = await submit(executor, "until_stopped", time_left_s=0.1)[0].outcome()
+            assert not soon.work.result["cancelled"]
+
+    asyncio.run(scenario())
+
+
+def test_a_dead_worker_loses_its_own_work_and_is_replaced(new_executor, tmp_path):
+    async def scenario():
+        async with started(new_executor) as executor:
+            gate = tmp_path / "gate"
+            bystander, _ = submit(executor, "until_file", {"path": str(gate)})
+            log = tmp_path / "deaths"
+            lost = await submit(executor, "die", {"log": str(log), "deaths": 1})[0].outcome()
+            assert isinstance(lost, Lost)
+            deaf, told = submit(executor, "deaf")
+            await eventually(lambda: bool(told))
+            waiting, _ = submit(executor, "echo")
+            given_up, _ = submit(executor, "echo")
+            given_up.kill()
+            assert isinstance(await given_up.outcome(), Lost)
+            deaf.kill()
+            assert isinstance(await deaf.outcome(), Lost)
+            assert isinstance(await waiting.outcome(), Returned)
+            await eventually(lambda: executor.ready == 2)
+            assert executor.restarts == 2
+            gate.touch()
+            assert isinstance(await bystander.outcome(), Returned)
+
+    asyncio.run(scenario())
+
+
+def test_closing_ends_what_runs(new_executor):
+    async def scenario():
+        async with started(new_executor) as executor:
+            deaf, told = submit(executor, "deaf")
+            await eventually(lambda: bool(told))
+        assert isinstance(await deaf.outcome(), Lost)
+        assert executor.ready == 0
+
+    asyncio.run(scenario())
+
+
+def test_a_killed_node_loses_no_job(nodes, tmp_path):
+    async def scenario():
+        log = tmp_path / "log"
+        database = Database(url_of(tmp_path))
+        service = JobService(database, KINDS, ray_executors(nodes)(2), max_queued=1000)
+        await service.start()
+        await eventually(lambda: service.load().ready == 2)
+        held = [(await service.submit("until_file", {"path": str(tmp_path / "gate")}))[0] for _ in range(1)]
+        jobs = [
+            (await service.submit("note", {"log": str(log), "number": number}))[0] for number in range(200)
+        ]
+        await eventually(lambda: log.exists() and len(log.read_text().split()) >= 50)
+        nodes.kill_one()
+        (tmp_path / "gate").touch()
+        done = [await finished(service, job) for job in (*held, *jobs)]
+        assert {job.status for job in done} == {JobStatus.SUCCEEDED}
+        # Who was lost in the midst of it may have written its line already.
+        lines = Counter(map(int, log.read_text().split()))
+        assert lines.keys() == set(range(200))
+        assert all(lines[number] <= job.attempt for number, job in enumerate(done[1:]))
+        nodes.add()
+        await eventually(lambda: service.load().ready == 2)
+        await service.stop(0)
+        database.dispose()
+
+    asyncio.run(scenario())
+
+
+def test_two_services_share_a_cluster_and_do_no_job_twice(nodes, postgresql, tmp_path):
+    async def scenario():
+        log = tmp_path / "log"
+        url = postgresql.new_database()
+        make = ray_executors(nodes)
+        # One worker each, on a node each.
+        async with (
+            running(url, max_queued=1000, executor=make(1)) as one,
+            running(url, max_queued=1000, executor=make(1)) as other,
+        ):
+            services = (one, other)
+            jobs = [
+                (await services[n % 2].submit("note", {"log": str(log), "number": n}))[0] for n in range(100)
+            ]
+            done = [await finished(services[(n + 1) % 2], job) for n, job in enumerate(jobs)]
+        assert {(job.status, job.attempt) for job in done} == {(JobStatus.SUCCEEDED, 1)}
+        assert sorted(map(int, log.read_text().split())) == list(range(100))
+        assert len({job.result["pid"] for job in done}) == 2
+
+    asyncio.run(scenario())

@@ -1,0 +1,61 @@
+"""A Ray cluster of several nodes on this machine, for tests and benchmarks."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import Any
+
+# Nothing is sent anywhere; and nodes that were killed are noticed in a second.
+os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+_SYSTEM = {"health_check_period_ms": 200, "health_check_failure_threshold": 3, "health_check_timeout_ms": 500}
+
+
+def ray_is_installed() -> bool:
+    """Say whether the extra is there."""
+    return find_spec("ray") is not None
+
+
+class RayNodes:
+    """A head that runs no work, and nodes with one core each.
+
+    Parameters
+    ----------
+    count
+        How many nodes there are at first.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._nodes: list[Any] = []
+        from ray.cluster_utils import Cluster  # noqa: PLC0415 - an extra
+
+        head = {"num_cpus": 0, "include_dashboard": False, "_system_config": _SYSTEM}
+        with _kept_signals():
+            self._cluster = Cluster(initialize_head=True, head_node_args=head)
+        for _ in range(count):
+            self.add()
+        self.address: str = self._cluster.address
+
+    def kill_one(self) -> None:
+        """Kill a node and all that runs on it, as a machine that loses power."""
+        self._cluster.remove_node(self._nodes.pop(), allow_graceful=False)
+
+    def add(self) -> None:
+        """Add a node."""
+        with _kept_signals():
+            self._nodes.append(self._cluster.add_node(num_cpus=1))
+
+    def close(self) -> None:
+        """End the cluster."""
+        self._cluster.shutdown()
+
+
+@contextmanager
+def _kept_signals() -> Iterator[None]:
+    """Give back the handler of SIGTERM, which Ray takes over for the process that starts nodes."""
+    kept = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, kept)
