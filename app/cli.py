@@ -59,6 +59,13 @@ class ExportFormat(StrEnum):
     CHECKPOINT = "checkpoint"
 
 
+class Executor(StrEnum):
+    """Where trainings run."""
+
+    LOCAL = "local"
+    RAY = "ray"
+
+
 Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
 Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
 DataDir = Annotated[Path | None, typer.Option(help="Folder of the database; made where it is missing.")]
@@ -150,6 +157,9 @@ def train(
     data_dir: DataDir = None,
     n_epochs: Annotated[int, typer.Option(min=1, help="Epochs of Algorithm 1 a source task.")] = 5000,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = os.cpu_count() or 1,
+    executor: Annotated[
+        Executor, typer.Option(help="local: processes of this machine; ray: the cluster of the settings.")
+    ] = Executor.LOCAL,
 ) -> None:
     """Train the source tasks of the paper's sizes and of the bundled examples into a library.
 
@@ -163,7 +173,8 @@ def train(
     tasks = source_tasks()
     fractions: dict[str, float] = {}
     with _bar("source tasks", total=float(len(tasks))) as advance:
-        for progress in train_library(tasks, target, n_epochs, workers):
+        cluster = settings.ray_address if executor is Executor.RAY else None
+        for progress in train_library(tasks, target, n_epochs, workers, cluster):
             fractions[progress.task.id] = progress.fraction
             advance(sum(fractions.values()), progress.task.name if progress.finished else "")
     if folder is None:

@@ -81,6 +81,11 @@ class Settings(BaseSettings):
     queue_limit: int = Field(
         default=64, ge=0, description="Jobs of a lane that may wait; one more is answered with 429"
     )
+    batch_limit: int = Field(
+        default=1000,
+        ge=1,
+        description="Most allocations in a batch, and most of batches that may wait; more are taken in later",
+    )
     job_grace_s: Seconds = Field(
         default=5.0,
         description="Seconds a job may go on after its cancellation or time limit; then it is killed",

@@ -16,15 +16,16 @@ import app
 from app.api import stored_json
 from app.api.access.guard import Guard
 from app.api.access.keys import KeyStore
+from app.api.batch import Batches
 from app.api.dashboard import install_dashboard
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
 from app.api.head_requests import HeadRequests
-from app.api.job_kinds import job_kinds
+from app.api.job_kinds import BATCH, job_kinds
 from app.api.json_body import BodyLimit
 from app.api.metrics import Metrics
 from app.api.request_log import RequestLog
-from app.api.routes import algorithms, allocation, examples, jobs, library, operations, plans
+from app.api.routes import algorithms, allocation, batch, examples, jobs, library, operations, plans
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.jobs.executor import Executor
@@ -78,7 +79,11 @@ def create_application(settings: Settings) -> FastAPI:
                 job_kinds(store, limits),
                 _workers(settings, database.environment),
                 reserve=_local(1, _WARM_UP_RESERVE, settings, database.environment),
-                max_queued=settings.queue_limit,
+                max_queued={
+                    "interactive": settings.queue_limit,
+                    "batch": settings.batch_limit,
+                    "training": settings.queue_limit,
+                },
                 max_attempts=settings.job_attempts,
                 overrun_grace_s=settings.job_grace_s,
                 retention_s=settings.job_retention_s,
@@ -89,7 +94,9 @@ def create_application(settings: Settings) -> FastAPI:
             # What is there now stays: to look through it for garbage would only hold up requests.
             gc.collect()
             gc.freeze()
-            application.state.services = Services(settings, database, store, service, keys, metrics)
+            application.state.services = Services(
+                settings, database, store, service, Batches(service, BATCH), keys, metrics
+            )
             try:
                 yield
             finally:
@@ -108,7 +115,7 @@ def create_application(settings: Settings) -> FastAPI:
         generate_unique_id_function=operation_id,
         middleware=_middleware(settings, metrics),
     )
-    for room in (allocation, algorithms, jobs, plans, library, examples, operations):
+    for room in (allocation, batch, algorithms, jobs, plans, library, examples, operations):
         application.include_router(room.router)
     install_error_handlers(application)
     install_dashboard(application, settings)

@@ -15,6 +15,7 @@ from starlette.responses import HTMLResponse
 from starlette.staticfiles import StaticFiles
 
 from app.api.access.guard import SCHEME, document, needed_role
+from app.api.batch_models import BatchLine
 from app.api.problem_details import ProblemDetails, responses
 from app.api.security_headers import content_policy
 from app.settings import Settings
@@ -67,6 +68,12 @@ def install_documentation(application: FastAPI, settings: Settings) -> None:
             components |= problem.pop("$defs")
             components["ProblemDetails"] = problem
             _name_limits(components, settings)
+            # A line of a stream, which the framework does not see.
+            line = BatchLine.model_json_schema(
+                mode="serialization", ref_template="#/components/schemas/{model}"
+            )
+            components |= line.pop("$defs")
+            components["BatchLine"] = line
             schema["components"]["securitySchemes"] = {"ApiKey": SCHEME}
             for path, operations in schema["paths"].items():
                 for method, operation in operations.items():

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -39,6 +40,8 @@ _CODES: Mapping[type[Exception], str] = {
     store_errors.DuplicatePolicy: "duplicate-policy",
     store_errors.InvalidPolicy: "invalid-policy",
 }
+Handler = Callable[[Request, Exception], Response]
+
 _DRAINING_RETRY_S = 5.0
 _STORE_IS_AWAY = (OperationalError, InterfaceError)
 
@@ -54,6 +57,22 @@ def install_error_handlers(application: FastAPI) -> None:
     for error in _STORE_IS_AWAY:
         application.add_exception_handler(error, _store_unavailable)
     application.add_exception_handler(Exception, _defect)
+
+
+def problem_of(request: Request, error: Exception) -> dict[str, Any]:
+    """Return the problem details that would answer an error, for an answer that has begun already."""
+    known: tuple[tuple[tuple[type[Exception], ...], Handler], ...] = (
+        ((RequestError,), _request_error),
+        ((AllocatorError,), _allocator_error),
+        (tuple(_CODES), _known_error),
+        (_STORE_IS_AWAY, _store_unavailable),
+    )
+    handle = next((handler for kinds, handler in known if isinstance(error, kinds)), None)
+    if handle is None:
+        _log.error("an answer that was begun ends with a defect", exc_info=error)
+        handle = _defect
+    problem: dict[str, Any] = json.loads(bytes(handle(request, error).body))
+    return problem
 
 
 def field_errors(violations: Sequence[Violation], prefix: str = "") -> list[FieldError]:

@@ -5,6 +5,7 @@ RequestError
  ├─ UnsupportedMediaType    the body is not sent as JSON
  ├─ UnsupportedContentEncoding  the body is sent compressed
  ├─ BodyTooLarge            the body has more bytes than are taken
+ ├─ BatchTooLarge           a batch has more allocations than are taken
  ├─ NotReady                a part of the service does not answer
  ├─ JobCancelled            a job that somebody waits for was cancelled before it had a plan
  ├─ JobFailed               a job that somebody waits for ended with an error
@@ -87,6 +88,19 @@ class BodyTooLarge(RequestError):
         super().__init__(
             "body-too-large",
             f"at most {limit} bytes are taken, the body has {size}",
+            extensions={"limit": limit},
+        )
+
+
+class BatchTooLarge(RequestError):
+    """A batch has more allocations than are taken."""
+
+    def __init__(self, limit: int, given: int) -> None:
+        detail = f"at most {limit} allocations are taken at once, the batch has {given}"
+        super().__init__(
+            "batch-too-large",
+            detail,
+            errors=[FieldError(pointer="/problems", detail=detail)],
             extensions={"limit": limit},
         )
 

@@ -14,6 +14,7 @@ from policy_store.checkpoint import ContainerLimits
 from policy_store.library import PolicyLibrary
 
 ALLOCATE = "allocate"
+BATCH = "batch"
 TRAIN = "train"
 REGISTER = "register"
 
@@ -38,6 +39,7 @@ def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
 
     return [
         JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive", at_once="app.jobs.work:allocate_at_once"),
+        JobKind(BATCH, "app.jobs.work:allocate", "batch"),
         JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library),
         # The weights are the job's artifact, and the policy's.
         JobKind(

@@ -34,7 +34,7 @@ class JobSummary(AnswerModel):
     """A job without what it found."""
 
     id: str = Field(description="32 hexadecimal digits")
-    kind: str = Field(description="allocate, train or register")
+    kind: str = Field(description="allocate, batch (an allocation of one), train or register")
     status: JobStatus = Field(description="Where it is in its life")
     created_at: datetime = Field(description="When it was asked for, UTC")
     started_at: datetime | None = Field(description="When its newest attempt began, UTC")

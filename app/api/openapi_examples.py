@@ -30,6 +30,19 @@ _SMALL_TASK = {
 }
 
 
+BATCH_EXAMPLES: dict[str, Example] = {
+    "two": Example(
+        summary="Two small problems",
+        value={
+            "problems": [
+                {"id": "monday", **_SMALL_TASK, "algorithm": "greedy"},
+                {"id": "tuesday", **_SMALL_TASK, "algorithm": "local_search", "time_limit_s": 0.5},
+            ]
+        },
+    )
+}
+
+
 def example_names() -> list[str]:
     """List the shipped example problems."""
     return sorted(

@@ -33,6 +33,7 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "unknown-algorithm": HTTPStatus.UNPROCESSABLE_ENTITY,
     "invalid-parameters": HTTPStatus.UNPROCESSABLE_ENTITY,
     "problem-too-large": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "batch-too-large": HTTPStatus.UNPROCESSABLE_ENTITY,
     "invalid-checkpoint": HTTPStatus.UNPROCESSABLE_ENTITY,
     "no-compatible-source": HTTPStatus.CONFLICT,
     # app.jobs.errors and what a job can end with

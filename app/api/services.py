@@ -8,6 +8,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 
 from app.api.access.keys import KeyStore
+from app.api.batch import Batches
 from app.api.metrics import Metrics
 from app.jobs.service import JobService
 from app.settings import Settings
@@ -23,6 +24,7 @@ class Services:
     database: Database
     library: PolicyLibrary
     jobs: JobService
+    batches: Batches
     keys: KeyStore
     metrics: Metrics
 

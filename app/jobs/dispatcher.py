@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -63,7 +63,7 @@ class Dispatcher:
         reserve: Executor | None,
         channels: Channels,
         *,
-        max_queued: int,
+        max_queued: Mapping[Lane, int],
         overrun_grace_s: float,
         retention_s: float | None,
         observer: JobObserver,
@@ -164,8 +164,8 @@ class Dispatcher:
     ) -> tuple[Job, bool]:
         lane = kind.lane
         run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
-        worked_off_s = self._lanes.time_to_work_off(lane, self._max_queued, self._running(lane))
-        limit = QueueLimit(self._max_queued, worked_off_s)
+        places = self._max_queued[lane]
+        limit = QueueLimit(places, self._lanes.time_to_work_off(lane, places, self._running(lane)))
         if run_now:
             self._lanes.running[lane] += 1
         try:

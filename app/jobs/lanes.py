@@ -1,4 +1,4 @@
-"""Who may start: two lanes share the workers so that what somebody waits for is not behind trainings."""
+"""Who may start: lanes share the workers so that what somebody waits for is not behind the rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Lanes:
     """Counts the workers in use and the jobs that wait, lane by lane.
 
     Trainings hold at most all workers but one; where there is only one, they share it. Interactive jobs
-    come first in both cases.
+    come first in both cases, then those of batches, which may hold all workers.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ class Lanes:
     """
 
     def __init__(self, capacity: int) -> None:
-        self._workers: dict[Lane, int] = {"interactive": capacity, "training": max(1, capacity - 1)}
+        self._workers: dict[Lane, int] = dict.fromkeys(LANES, capacity)
+        self._workers["training"] = max(1, capacity - 1)
         self.running: dict[Lane, int] = dict.fromkeys(LANES, 0)
         self.waiting: dict[Lane, int] = dict.fromkeys(LANES, 0)
         self._durations: dict[Lane, deque[float]] = {

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
-Lane = Literal["interactive", "training"]
-LANES: tuple[Lane, ...] = ("interactive", "training")
+Lane = Literal["interactive", "batch", "training"]
+LANES: tuple[Lane, ...] = ("interactive", "batch", "training")
+"""In the order in which they get free workers."""
 
 
 class JobStatus(StrEnum):
@@ -200,7 +201,8 @@ class JobKind:
         ``"module:function"``, resolved only in the worker; the function takes the payload and a
         :class:`app.jobs.work_context.WorkContext` and returns a :class:`WorkResult`.
     lane
-        ``"interactive"`` for what somebody waits for, ``"training"`` for what takes long.
+        ``"interactive"`` for what somebody waits for, ``"batch"`` for what comes by the hundred,
+        ``"training"`` for what takes long.
     on_success
         Called inside the transaction that marks a job succeeded, in a thread of the web process; what it
         returns is the stored result. It gets the job as it was while running. What it raises rolls the

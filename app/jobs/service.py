@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from app.jobs.channel import Channels, rung
 from app.jobs.dispatcher import Dispatcher
 from app.jobs.executor import Executor
-from app.jobs.model import Idempotency, Job, JobEvent, JobKind, JobPage, JobStatus, Load, Progress
+from app.jobs.model import (
+    LANES,
+    Idempotency,
+    Job,
+    JobEvent,
+    JobKind,
+    JobPage,
+    JobStatus,
+    Lane,
+    Load,
+    Progress,
+)
 from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
 from app.jobs.reading import Database
@@ -19,6 +30,7 @@ from app.jobs.store import JobStore
 
 # Who waits for a job that another process runs may miss what is told of its end, and looks at the table.
 _LOOK_AGAIN_S = 5.0
+_PLACES = 64
 # Its progress is told by nobody: who wants to see that looks as often as it is stored.
 _LOOK_FOR_PROGRESS_S = 1.0
 
@@ -42,7 +54,7 @@ class JobService:
         Answers the jobs that still wait when their time limit ends, where their kind has what does it; it is
         started and closed by the service. None: they wait for a worker all the same.
     max_queued
-        How many jobs may wait in each lane.
+        How many jobs may wait in each lane, or in those that are named; 64 in the others.
     max_attempts
         How often a job may be lost with its worker or its process before it has failed.
     overrun_grace_s
@@ -62,7 +74,7 @@ class JobService:
         executor: Executor,
         *,
         reserve: Executor | None = None,
-        max_queued: int = 64,
+        max_queued: int | Mapping[Lane, int] = _PLACES,
         max_attempts: int = 3,
         overrun_grace_s: float = 5.0,
         retention_s: float | None = None,
@@ -80,7 +92,9 @@ class JobService:
             executor,
             reserve,
             self._channels,
-            max_queued=max_queued,
+            max_queued=dict.fromkeys(LANES, max_queued)
+            if isinstance(max_queued, int)
+            else {**dict.fromkeys(LANES, _PLACES), **max_queued},
             overrun_grace_s=overrun_grace_s,
             retention_s=retention_s,
             observer=observer or NoObserver(),

@@ -69,7 +69,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     payload
         ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, ``library_url``, the database
         with the source policies, ``threads``, how many cores to keep busy, and ``bound_time_limit_s``, how
-        long to look for a bound, where one is asked for.
+        long to look for a bound, where one is asked for; ``run_time_limit_s`` where time counts from here.
     context
         Where progress goes. When it says stop, the best plan so far is the result.
 
@@ -84,6 +84,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     AllocatorError
         If the algorithm refuses the problem or its parameters.
     """
+    if "run_time_limit_s" in payload:
+        context.end_within(payload["run_time_limit_s"])
     problem = problem_from_record(payload["problem"])
     algorithm, seed = payload["algorithm"], payload["seed"]
     limit = TimeLimit(context, _answer_time, problem, payload.get("bound_time_limit_s"))

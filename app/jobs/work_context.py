@@ -46,6 +46,10 @@ class WorkContext:
             control[DEADLINE] = time.monotonic() + time_limit_s
         return cls(report, control)
 
+    def end_within(self, limit_s: float) -> None:
+        """Let the time be up in so many seconds, if it is not before."""
+        self._control[DEADLINE] = min(self._control[DEADLINE], time.monotonic() + limit_s)
+
     def report(self, progress: Progress) -> None:
         """Tell how far the work is; may be called as often as there is news."""
         self._report(progress)

@@ -10,21 +10,19 @@ from concurrent.futures import Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Problem
-from app.domain.records import problem_from_record, problem_to_record
+from app.domain.records import problem_to_record
 from app.learning.checkpoint import read_metadata, with_name
+from app.learning.cluster_training import train_on_cluster
 from app.learning.parameters import QmixParameters
-from app.learning.qmix import Qmix
+from app.learning.source_training import SEED, train_source
 from app.simulation.generator import generate
-from app.solvers.protocol import Progress, SolverContext
-
-SEED = 123
-"""Table 1; tasks are drawn from it too."""
+from app.solvers.protocol import Progress
 
 PAPER_SHAPES = tuple((m, n, 3) for m in (5, 10, 20) for n in (5, 10, 20, 30))
 """Sizes of section 5.2.4: UAVs, targets, materials."""
@@ -116,7 +114,7 @@ def source_parameters(task: SourceTask, n_epochs: int) -> QmixParameters:
 
 
 def train_library(
-    tasks: Sequence[SourceTask], folder: Path, n_epochs: int, workers: int
+    tasks: Sequence[SourceTask], folder: Path, n_epochs: int, workers: int, cluster: str | None = None
 ) -> Iterator[SourceProgress]:
     """Train source tasks, each to a file ``{id}.safetensors``.
 
@@ -133,11 +131,14 @@ def train_library(
         Epochs of Algorithm 1 a task.
     workers
         Processes, each with one thread.
+    cluster
+        Address of a Ray cluster that trains instead, as many tasks at a time as it has CPUs. A task that is
+        lost with its machine begins anew; files are the same wherever they were trained.
 
     Yields
     ------
     SourceProgress
-        Kept files first, then whatever has changed, about twice a second.
+        Kept files first, then whatever has changed, about twice a second; a cluster tells only the ends.
     """
     folder.mkdir(parents=True, exist_ok=True)
     left = []
@@ -146,8 +147,16 @@ def train_library(
             yield SourceProgress(task, 1.0, finished=True, kept=True)
         else:
             left.append(task)
-    if left:
+    if not left:
+        return
+    if cluster is None:
         yield from _train(left, folder, n_epochs, workers)
+        return
+    trainings = [(problem_to_record(task.problem), source_parameters(task, n_epochs)) for task in left]
+    for place, checkpoint in train_on_cluster(trainings, cluster):
+        task = left[place]
+        _write(_file(folder, task), with_name(checkpoint, task.name))
+        yield SourceProgress(task, 1.0, finished=True)
 
 
 def _file(folder: Path, task: SourceTask) -> Path:
@@ -220,6 +229,4 @@ def _train_one(index: int, record: dict[str, Any], parameters: QmixParameters) -
     def report(progress: Progress) -> None:
         _shared["fractions"][index] = progress.fraction
 
-    solver = Qmix(parameters, SolverContext())
-    solution = solver.solve(problem_from_record(record), SEED, _shared["stopped"].is_set, report)
-    return cast(bytes, solution.checkpoint)
+    return train_source(record, parameters, _shared["stopped"].is_set, report)

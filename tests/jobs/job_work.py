@@ -22,6 +22,10 @@ def echo(payload: Payload, context: WorkContext) -> WorkResult:
     return WorkResult({"echo": payload, "pid": os.getpid()}, artifact.encode() if artifact else None)
 
 
+def nothing(payload: Payload, context: WorkContext) -> WorkResult:
+    return WorkResult({})
+
+
 def note(payload: Payload, context: WorkContext) -> WorkResult:
     """Write a line with the payload's number into a file: it is there as often as this was done."""
     with Path(payload["log"]).open("a") as lines:

@@ -16,6 +16,7 @@ from app.jobs.local import SINGLE_THREADED, LocalExecutor
 from app.jobs.model import JobStatus, Progress
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
+from app.learning.train_library import source_tasks, train_library
 from policy_store.database import Database
 
 HERE = Path(__file__).parent
@@ -234,3 +235,18 @@ def test_two_services_share_a_cluster_and_do_no_job_twice(nodes, postgresql, tmp
         assert len({job.result["pid"] for job in done}) == 2
 
     asyncio.run(scenario())
+
+
+def test_a_library_is_the_same_wherever_it_was_trained(nodes, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(HERE.parents[1]))
+    tasks = source_tasks([(2, 2, 1), (1, 3, 2)], families=("uniform",))
+    told = list(train_library(tasks, tmp_path / "there", n_epochs=6, workers=1, cluster=nodes.address))
+    assert {event.task.id for event in told if event.finished} == {task.id for task in tasks}
+    list(train_library(tasks, tmp_path / "here", n_epochs=6, workers=1))
+    trained = [
+        {file.name: file.read_bytes() for file in (tmp_path / where).iterdir()} for where in ("here", "there")
+    ]
+    assert trained[0] == trained[1]
+    # What is there is kept, whoever trained it.
+    again = train_library(tasks, tmp_path / "here", n_epochs=6, workers=1, cluster=nodes.address)
+    assert [event.kept for event in again] == [True, True]

@@ -116,6 +116,17 @@ def before_call(ctx, case, kwargs):
         return
     if case.path == "/allocate" and is_long(body.get("time_limit_s")):
         case.body = {**body, "time_limit_s": LONGEST_S}
+    problems = body.get("problems")
+    if case.path == "/allocate/batch" and isinstance(problems, list):
+        case.body = {
+            **body,
+            "problems": [
+                {**each, "time_limit_s": LONGEST_S}
+                if isinstance(each, dict) and is_long(each.get("time_limit_s"))
+                else each
+                for each in problems
+            ],
+        }
     train = body.get("train")
     if case.path == "/library" and isinstance(train, dict):
         parameters = train.get("parameters", {})

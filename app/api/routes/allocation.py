@@ -9,6 +9,7 @@ from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
 from app.api.allocation_models import Allocation, AllocationRequest
+from app.api.allocation_payload import allocation_payload
 from app.api.job_answers import accepted, answer_of, idempotency
 from app.api.job_kinds import ALLOCATE
 from app.api.job_models import JobModel
@@ -16,11 +17,8 @@ from app.api.json_body import JsonRoute
 from app.api.openapi_examples import ALLOCATION_EXAMPLES
 from app.api.preferences import Preferences
 from app.api.problem_details import responses
-from app.api.problem_models import to_problem
 from app.api.routes.parameters import LOCATION, IdempotencyKey, Prefer
 from app.api.services import Served
-from app.domain.records import problem_to_record
-from app.solvers.registry import parse_parameters
 
 router = APIRouter(route_class=JsonRoute, tags=["allocation"])
 
@@ -66,17 +64,7 @@ async def allocate(
     The call waits for the plan and answers 200. With `Prefer: respond-async` it answers 202 at once, with
     `Prefer: wait=N` after N seconds at most; `Location` is then the job to poll, to listen to, or to cancel.
     """
-    problem = to_problem(body, services.settings)
-    parameters = parse_parameters(body.algorithm, body.parameters)
-    payload = {
-        "problem": problem_to_record(problem),
-        "algorithm": body.algorithm,
-        "parameters": parameters.model_dump(mode="json"),
-        "seed": body.seed,
-        "library_url": services.database.url,
-    }
-    if body.bound_seconds is not None:
-        payload["bound_time_limit_s"] = body.bound_seconds
+    payload = allocation_payload(body, services)
     job, _ = await services.jobs.submit(
         ALLOCATE,
         # Not part of what makes a request the same: an operator may change it between two tries.

@@ -1,0 +1,33 @@
+"""From a request for an allocation to the payload of its job."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.api.allocation_models import AllocationRequest
+from app.api.problem_models import to_problem
+from app.api.services import Services
+from app.domain.records import problem_to_record
+from app.solvers.registry import parse_parameters
+
+
+def allocation_payload(body: AllocationRequest, services: Services) -> dict[str, Any]:
+    """Return what makes an allocation what it is; the time that it has is not a part of it.
+
+    Raises
+    ------
+    ProblemTooLarge, InvalidProblem
+        As :func:`app.api.problem_models.to_problem` does.
+    UnknownAlgorithm, InvalidParameters
+        If there is no such algorithm, or its parameters are unknown or out of range.
+    """
+    payload = {
+        "problem": problem_to_record(to_problem(body, services.settings)),
+        "algorithm": body.algorithm,
+        "parameters": parse_parameters(body.algorithm, body.parameters).model_dump(mode="json"),
+        "seed": body.seed,
+        "library_url": services.database.url,
+    }
+    if body.bound_seconds is not None:
+        payload["bound_time_limit_s"] = body.bound_seconds
+    return payload

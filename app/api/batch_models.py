@@ -1,0 +1,35 @@
+"""A batch on the wire: what is asked, and a line of what is answered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from app.api.allocation_models import Allocation, AllocationRequest, AnswerModel
+from app.api.problem_models import Identifier, WireModel
+
+
+class BatchItem(AllocationRequest):
+    """An allocation, with a name by which its answer is known."""
+
+    id: Identifier | None = Field(default=None, description="Comes back with the answer; need not be unique")
+
+
+class BatchRequest(WireModel):
+    """Allocations that have nothing to do with one another."""
+
+    problems: list[BatchItem] = Field(
+        min_length=1, description="As many bodies of `POST /allocate` as the operator takes"
+    )
+
+
+class BatchLine(AnswerModel):
+    """The answer to one allocation of a batch: a plan, or why there is none."""
+
+    index: int = Field(description="Its place in the request, from 0")
+    id: str | None = Field(default=None, description="As in the request, if it has one there")
+    allocation: Allocation | None = Field(default=None, description="The plan")
+    problem: dict[str, Any] | None = Field(
+        default=None, description="Problem details (RFC 9457), as `POST /allocate` would have answered"
+    )

@@ -1,0 +1,169 @@
+"""What a second machine brings, and what a job costs: 500 allocations of 10x20 on workers here and on Ray.
+
+    python tests/benchmarks/bench_cluster.py [--jobs 500] [--database postgresql|sqlite] [--quick]
+
+The nodes are Ray's own on this machine, with one core each; the head runs no work. A row is one service, or
+two, with one job table: submit everything, wait for the last. Asked: with two nodes at least 1.8 times the
+throughput of one, and at most 10 ms a job more on Ray than on the local executor, measured one job after the
+other with work that does nothing. PostgreSQL is Debian's, started for this with every commit on its disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "tests/jobs"), str(ROOT)]
+
+import numpy as np  # noqa: E402
+from postgresql_server import PostgresqlServer  # noqa: E402
+from ray_nodes import RayNodes  # noqa: E402
+
+from app.domain.records import problem_to_record  # noqa: E402
+from app.jobs.executor import Executor  # noqa: E402
+from app.jobs.local import SINGLE_THREADED, LocalExecutor  # noqa: E402
+from app.jobs.model import Job, JobKind, JobStatus  # noqa: E402
+from app.jobs.ray_cluster import RayExecutor  # noqa: E402
+from app.jobs.service import JobService  # noqa: E402
+from app.simulation.generator import generate  # noqa: E402
+from app.solvers.registry import parse_parameters  # noqa: E402
+from policy_store.database import Database  # noqa: E402
+
+ASKED_SPEED_UP, ASKED_OVERHEAD_MS = 1.8, 10.0
+KINDS = (
+    JobKind("allocate", "app.jobs.work:allocate", "batch"),
+    JobKind("nothing", "job_work:nothing", "interactive"),
+)
+WARM_UP = "app.jobs.work:warm_up"
+NOTHING_TIMES = 300
+
+
+def main() -> int:
+    """Measure and print a row each."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--jobs", type=int, default=500)
+    parser.add_argument("--database", choices=("postgresql", "sqlite"), default="postgresql")
+    parser.add_argument("--quick", action="store_true", help="60 jobs")
+    given = parser.parse_args()
+    payloads = _payloads(60 if given.quick else given.jobs)
+    with tempfile.TemporaryDirectory() as folder:
+        server = PostgresqlServer(durable=True) if given.database == "postgresql" else None
+        nodes = RayNodes(2)
+        try:
+            return asyncio.run(_measure(payloads, nodes, server, Path(folder)))
+        finally:
+            nodes.close()
+            if server is not None:
+                server.close()
+
+
+async def _measure(
+    payloads: list[dict[str, Any]], nodes: RayNodes, server: PostgresqlServer | None, folder: Path
+) -> int:
+    def new_url(name: str) -> str:
+        return f"sqlite:///{folder / name}.db" if server is None else server.new_database()
+
+    rows: dict[str, tuple[float, float]] = {}
+    for name, services in {
+        "1 worker here": [LocalExecutor(1, warm_up=WARM_UP, environment=_environment())],
+        "2 workers here": [LocalExecutor(2, warm_up=WARM_UP, environment=_environment())],
+        "1 node": [_on_ray(nodes, 1)],
+        "2 nodes": [_on_ray(nodes, 2)],
+        "2 nodes, 2 services": [_on_ray(nodes, 1), _on_ray(nodes, 1)],
+    }.items():
+        if len(services) > 1 and server is None:
+            continue  # one service at a time works on an SQLite file
+        rows[name] = await _row(services, new_url(name.replace(" ", "-")), payloads)
+    kept_in = "SQLite" if server is None else "PostgreSQL"
+    print(f"{len(payloads)} allocations of 10x20 by the genetic algorithm; jobs are kept in {kept_in}")
+    print(f"{'':<22} {'jobs/s':>8} {'ms a job that does nothing':>28}")
+    for name, (throughput, nothing_ms) in rows.items():
+        print(f"{name:<22} {throughput:>8.1f} {nothing_ms:>28.2f}")
+    speed_up = rows["2 nodes"][0] / rows["1 node"][0]
+    overhead = rows["1 node"][1] - rows["1 worker here"][1]
+    print(f"\n2 nodes over 1: {speed_up:.2f}, asked: at least {ASKED_SPEED_UP:g}")
+    print(f"a job on Ray over one here: {overhead:.2f} ms, asked: at most {ASKED_OVERHEAD_MS:g} ms")
+    return 0 if speed_up >= ASKED_SPEED_UP and overhead <= ASKED_OVERHEAD_MS else 1
+
+
+async def _row(executors: list[Executor], url: str, payloads: list[dict[str, Any]]) -> tuple[float, float]:
+    """Return jobs a second of all, and the median of a job that does nothing, in milliseconds."""
+    async with _services(executors, url) as services:
+        begun = time.perf_counter()
+        jobs = [
+            (await services[number % len(services)].submit("allocate", payload))[0]
+            for number, payload in enumerate(payloads)
+        ]
+        await asyncio.gather(
+            *(_ended(services[number % len(services)], job) for number, job in enumerate(jobs))
+        )
+        throughput = len(jobs) / (time.perf_counter() - begun)
+        walls_ms = []
+        for _ in range(NOTHING_TIMES):
+            begun = time.perf_counter()
+            await _ended(services[0], (await services[0].submit("nothing", {}))[0])
+            walls_ms.append(1000 * (time.perf_counter() - begun))
+    return throughput, statistics.median(walls_ms)
+
+
+async def _ended(service: JobService, job: Job) -> None:
+    ended = await service.wait(job.id, None)
+    if ended.status is not JobStatus.SUCCEEDED:
+        raise SystemExit(f"job {ended.id} is {ended.status}: {ended.error}")
+
+
+@asynccontextmanager
+async def _services(executors: list[Executor], url: str) -> AsyncIterator[list[JobService]]:
+    databases = [Database(url) for _ in executors]
+    services = [
+        JobService(database, KINDS, executor, max_queued={"batch": 100_000})
+        for database, executor in zip(databases, executors, strict=True)
+    ]
+    for service in services:
+        await service.start()
+    while any(service.load().ready < service.load().capacity for service in services):
+        await asyncio.sleep(0.05)
+    try:
+        yield services
+    finally:
+        for service in reversed(services):
+            await service.stop(0)
+        for database in databases:
+            database.dispose()
+
+
+def _on_ray(nodes: RayNodes, workers: int) -> RayExecutor:
+    return RayExecutor(workers, address=nodes.address, warm_up=WARM_UP, environment=_environment())
+
+
+def _environment() -> dict[str, str]:
+    return {**SINGLE_THREADED, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+def _payloads(count: int) -> list[dict[str, Any]]:
+    """Return problems of 10 UAVs and 20 areas, each another one."""
+    parameters = parse_parameters("ga", {}).model_dump(mode="json")
+    return [
+        {
+            "problem": problem_to_record(generate("uniform", 10, 20, 3, np.random.default_rng(seed))),
+            "algorithm": "ga",
+            "parameters": parameters,
+            "seed": seed,
+            "library_url": None,
+        }
+        for seed in range(count)
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
