@@ -3,9 +3,11 @@
 #   docker build --build-arg TORCH_INDEX=ADDRESS -t uav-allocator .
 #   docker run --rm -v allocator-data:/data uav-allocator python -m app keys create --role library --name me
 #   docker run --rm -p 8000:8000 -v allocator-data:/data uav-allocator
+# For more than one machine give the extras too, --build-arg EXTRAS=[postgres,ray]; .deploy/ has a compose file.
 FROM python:3.11-slim
 
 ARG TORCH_INDEX=
+ARG EXTRAS=
 
 ENV PIP_NO_CACHE_DIR=1 \
     PIP_DISABLE_PIP_VERSION_CHECK=1 \
@@ -20,7 +22,7 @@ COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY app ./app
 COPY policy_store ./policy_store
 RUN pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "$(grep '^torch==' constraints.txt)" \
-    && pip install --constraint constraints.txt .
+    && pip install --constraint constraints.txt ".$EXTRAS"
 
 # The compiled code is made here, as the user that runs it, so that no first answer waits for a compiler.
 RUN useradd --create-home --uid 1000 allocator \
@@ -28,7 +30,7 @@ RUN useradd --create-home --uid 1000 allocator \
     && chown allocator /data /srv/numba-cache
 USER allocator
 WORKDIR /data
-RUN python -m app allocate /srv/allocator/app/examples/paper-5x10.json --algorithm ga > /dev/null
+RUN python -c "from app.jobs.work import warm_up; warm_up()"
 
 VOLUME /data
 EXPOSE 8000

@@ -13,6 +13,10 @@ from app.api.problem_models import Identifier, WireModel
 class BatchItem(AllocationRequest):
     """An allocation, with a name by which its answer is known."""
 
+    # Without an enum: a name that is none is told in the line of its problem, and refuses no batch.
+    algorithm: str = Field(
+        default="transfer_qmix", description="See `GET /algorithms`", examples=["auto", "transfer_qmix"]
+    )
     id: Identifier | None = Field(default=None, description="Comes back with the answer; need not be unique")
 
 

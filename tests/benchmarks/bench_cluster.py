@@ -1,6 +1,7 @@
 """What a second machine brings, and what a job costs: 500 allocations of 10x20 on workers here and on Ray.
 
-    python tests/benchmarks/bench_cluster.py [--jobs 500] [--database postgresql|sqlite] [--quick]
+    python tests/benchmarks/bench_cluster.py [--jobs 500] [--algorithm local_search|ga]
+        [--database postgresql|sqlite] [--quick]
 
 The nodes are Ray's own on this machine, with one core each; the head runs no work. A row is one service, or
 two, with one job table: submit everything, wait for the last. Asked: with two nodes at least 1.8 times the
@@ -46,16 +47,19 @@ KINDS = (
 )
 WARM_UP = "app.jobs.work:warm_up"
 NOTHING_TIMES = 300
+PARAMETERS: dict[str, dict[str, Any]] = {"local_search": {"moves": 500_000}, "ga": {}}
+"""Some tenths of a second, and about ten milliseconds: of the latter the service's own core is the limit."""
 
 
 def main() -> int:
     """Measure and print a row each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--jobs", type=int, default=500)
+    parser.add_argument("--algorithm", choices=list(PARAMETERS), default="local_search")
     parser.add_argument("--database", choices=("postgresql", "sqlite"), default="postgresql")
     parser.add_argument("--quick", action="store_true", help="60 jobs")
     given = parser.parse_args()
-    payloads = _payloads(60 if given.quick else given.jobs)
+    payloads = _payloads(60 if given.quick else given.jobs, given.algorithm)
     with tempfile.TemporaryDirectory() as folder:
         server = PostgresqlServer(durable=True) if given.database == "postgresql" else None
         nodes = RayNodes(2)
@@ -85,7 +89,7 @@ async def _measure(
             continue  # one service at a time works on an SQLite file
         rows[name] = await _row(services, new_url(name.replace(" ", "-")), payloads)
     kept_in = "SQLite" if server is None else "PostgreSQL"
-    print(f"{len(payloads)} allocations of 10x20 by the genetic algorithm; jobs are kept in {kept_in}")
+    print(f"{len(payloads)} allocations of 10x20 by {payloads[0]['algorithm']}; jobs are kept in {kept_in}")
     print(f"{'':<22} {'jobs/s':>8} {'ms a job that does nothing':>28}")
     for name, (throughput, nothing_ms) in rows.items():
         print(f"{name:<22} {throughput:>8.1f} {nothing_ms:>28.2f}")
@@ -150,13 +154,13 @@ def _environment() -> dict[str, str]:
     return {**SINGLE_THREADED, "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
-def _payloads(count: int) -> list[dict[str, Any]]:
+def _payloads(count: int, algorithm: str) -> list[dict[str, Any]]:
     """Return problems of 10 UAVs and 20 areas, each another one."""
-    parameters = parse_parameters("ga", {}).model_dump(mode="json")
+    parameters = parse_parameters(algorithm, PARAMETERS[algorithm]).model_dump(mode="json")
     return [
         {
             "problem": problem_to_record(generate("uniform", 10, 20, 3, np.random.default_rng(seed))),
-            "algorithm": "ga",
+            "algorithm": algorithm,
             "parameters": parameters,
             "seed": seed,
             "library_url": None,

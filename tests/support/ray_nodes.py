@@ -1,6 +1,7 @@
 """A Ray cluster of several nodes on this machine, for tests and benchmarks."""
 
 import os
+import secrets
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +10,8 @@ from typing import Any
 
 # Nothing is sent anywhere; and nodes that were killed are noticed in a second.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+# The nodes listen on the machine's address: nobody else may join them.
+os.environ.update(RAY_AUTH_MODE="token", RAY_AUTH_TOKEN=secrets.token_hex(32))
 _SYSTEM = {"health_check_period_ms": 200, "health_check_failure_threshold": 3, "health_check_timeout_ms": 500}
 
 
