@@ -189,6 +189,12 @@ def train_universal(
     work: Annotated[Path, typer.Option(help="Folder for demonstrations and states of trainings.")],
     name: Annotated[str, typer.Option(help="Id of the general policy; a family's has the family behind it.")],
     workers: Annotated[int, typer.Option(min=1, help="Processes or threads.")] = os.cpu_count() or 1,
+    executor: Annotated[
+        Executor,
+        typer.Option(
+            help="local; or ray: the cluster of the settings; all its machines see the folder WORK."
+        ),
+    ] = Executor.LOCAL,
 ) -> None:
     """Train the policies for every number of UAVs, areas and materials: a general one and one a family.
 
@@ -205,7 +211,8 @@ def train_universal(
             advance(share, f"{stage} {said}")
 
         parameters = production.UniversalTrainingParameters()
-        production.Production(work, parameters, workers, tell).run(folder, name)
+        cluster = _settings().ray_address if executor is Executor.RAY else None
+        production.Production(work.absolute(), parameters, workers, tell, cluster).run(folder, name)
 
 
 @application.command()

@@ -1,4 +1,4 @@
-"""Source tasks trained on a Ray cluster, as many at a time as it has CPUs.
+"""Trainings on a Ray cluster, as many at a time as it has CPUs.
 
 Ray is an extra: nothing imports it before a training is spread.
 """
@@ -6,8 +6,8 @@ Ray is an extra: nothing imports it before a training is spread.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
 
 from app.learning.parameters import QmixParameters
 from app.learning.source_training import train_source
@@ -15,23 +15,26 @@ from app.solvers.stop import never
 
 _SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
-def train_on_cluster(
-    trainings: Sequence[tuple[dict[str, Any], QmixParameters]], address: str
-) -> Iterator[tuple[int, bytes]]:
-    """Train source tasks, each on one core; one that is lost with its machine begins anew on another.
+
+def on_cluster(
+    job: Callable[[Item], Result], items: Sequence[Item], address: str
+) -> Iterator[tuple[int, Result]]:
+    """Do a job for every item, each on one core; one that is lost with its machine begins anew on another.
 
     Parameters
     ----------
-    trainings
-        Problem records, and what to train with.
+    job, items
+        Both are sent to other machines, and the result back.
     address
         Of the cluster's head, ``host:port``, or ``"local"`` for one that is started on this machine.
 
     Yields
     ------
     tuple
-        The place in ``trainings`` and the checkpoint, in the order in which they end.
+        The place of an item and its result, in the order in which they end.
 
     Raises
     ------
@@ -49,10 +52,10 @@ def train_on_cluster(
         ray.init(address, log_to_driver=False)
     try:
         # Without end: the cluster may lose as many machines as it likes.
-        train = ray.remote(
-            num_cpus=1, max_retries=-1, runtime_env={"env_vars": {**_SINGLE_THREADED, **_search_path()}}
-        )(_train)
-        places = {train.remote(*training): place for place, training in enumerate(trainings)}
+        environment = {"env_vars": {**_SINGLE_THREADED, **_search_path()}}
+        options: dict[str, Any] = {"num_cpus": 1, "max_retries": -1, "runtime_env": environment}
+        remote: Any = ray.remote(**options)(_call)
+        places = {remote.remote(job, item): place for place, item in enumerate(items)}
         pending = list(places)
         while pending:
             ended, pending = ray.wait(pending)
@@ -63,8 +66,20 @@ def train_on_cluster(
             ray.shutdown()
 
 
-def _train(record: dict[str, Any], parameters: QmixParameters) -> bytes:
+def train_on_cluster(
+    trainings: Sequence[tuple[dict[str, Any], QmixParameters]], address: str
+) -> Iterator[tuple[int, bytes]]:
+    """Train source tasks, given as problem records with what to train with; yields as :func:`on_cluster`."""
+    yield from on_cluster(_train, trainings, address)
+
+
+def _train(training: tuple[dict[str, Any], QmixParameters]) -> bytes:
+    record, parameters = training
     return train_source(record, parameters, never, lambda _progress: None)
+
+
+def _call(job: Callable[[Item], Result], item: Item) -> Result:
+    return job(item)
 
 
 def _search_path() -> dict[str, str]:

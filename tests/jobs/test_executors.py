@@ -17,9 +17,21 @@ from app.jobs.model import JobStatus, Progress
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.learning.train_library import source_tasks, train_library
+from app.learning.universal.production import Production, UniversalTrainingParameters
 from policy_store.database import Database
 
 HERE = Path(__file__).parent
+TINY = UniversalTrainingParameters(
+    shards=1,
+    updates=2,
+    improved_shards=1,
+    improved_updates=2,
+    family_shards=1,
+    family_updates=1,
+    width=8,
+    layers=1,
+    metric_problems=1,
+)
 HOW_TO_GET_IT = "no Ray: pip install '.[ray]' (REQUIRE_RAY=1 makes this a failure)"
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
@@ -250,3 +262,13 @@ def test_a_library_is_the_same_wherever_it_was_trained(nodes, tmp_path, monkeypa
     # What is there is kept, whoever trained it.
     again = train_library(tasks, tmp_path / "here", n_epochs=6, workers=1, cluster=nodes.address)
     assert [event.kept for event in again] == [True, True]
+
+
+def test_policies_for_every_size_are_the_same_wherever_their_parts_were_made(nodes, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(HERE.parents[1]))
+    made = []
+    for where, cluster in (("here", None), ("there", nodes.address)):
+        folder = tmp_path / where
+        production = Production(folder / "work", TINY, 1, lambda *said: None, cluster)
+        made.append([file.read_bytes() for file in production.run(folder / "library", "all")])
+    assert made[0] == made[1]

@@ -23,6 +23,7 @@ import torch
 from pydantic import Field
 
 from app.learning.checkpoint import encode
+from app.learning.cluster_training import on_cluster
 from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.curriculum import Shard
 from app.learning.universal.demonstrations import Series, demonstrate, read_shard, save_shard, write_shard
@@ -88,12 +89,16 @@ class Production:
         Processes, or threads, that work at the same time.
     tell
         Told about progress.
+    cluster
+        Address of a Ray cluster that does what processes do otherwise; all its machines see the folder
+        ``work``. What is fitted with all threads stays in this process, so the result is the same.
     """
 
     work: Path
     parameters: UniversalTrainingParameters
     workers: int
     tell: Tell
+    cluster: str | None = None
 
     def run(self, folder: Path, name: str) -> list[Path]:
         """Make the policies and write them as checkpoints, the general one first.
@@ -170,7 +175,14 @@ class Production:
         return file
 
     def _in_processes(self, stage: str, job: Callable[[Item], Path], items: Iterable[Item]) -> list[Path]:
-        """Do a job for every item in processes; results in the items' order."""
+        """Do a job for every item in processes, here or on a cluster; results in the items' order."""
+        if self.cluster is not None:
+            results: dict[int, Path] = {}
+            listed = list(items)
+            for place, path in on_cluster(job, listed, self.cluster):
+                results[place] = path
+                self.tell(stage, len(results) / len(listed), "")
+            return [results[place] for place in range(len(listed))]
         with ProcessPoolExecutor(self.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
             futures: list[Future[Path]] = [pool.submit(job, item) for item in items]
             for done, future in enumerate(as_completed(futures)):
