@@ -15,7 +15,7 @@ from app.jobs.model import Job, JobKind, JobStatus, WorkResult
 from app.jobs.service import JobService
 from policy_store.database import Database
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 # Of services that share a database: short, because tests wait for it where one was killed.
 LEASE_S = 1.5
 

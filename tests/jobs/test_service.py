@@ -156,7 +156,7 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
             with pytest.raises(QueueFull) as refusal:
                 await service.submit("echo", {})
             assert refusal.value.retry_after_s >= 1
-            assert service.load().waiting == {"interactive": 2, "training": 0}
+            assert service.load().waiting == {"interactive": 2, "batch": 0, "training": 0}
             await service.submit("train", {"path": str(gate)})  # the other lane has places of its own
             gate.touch()
             for job in jobs:
@@ -300,7 +300,7 @@ def test_a_caller_that_goes_away_leaves_its_job_whole(tmp_path):
             assert (await finished(service, after)).status is JobStatus.SUCCEEDED
             for job in (await service.list(10)).jobs:
                 assert (await finished(service, job)).status is JobStatus.SUCCEEDED
-            assert service.load().running == {"interactive": 0, "training": 0}
+            assert service.load().running == {"interactive": 0, "batch": 0, "training": 0}
 
     asyncio.run(scenario())
 
