@@ -6,10 +6,38 @@ On SQLite a service is :class:`Alone`; on a shared database it is in the company
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.jobs.model import Lane
 from app.jobs.owner import is_alive
+from app.jobs.run import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Reactions:
+    """What the dispatcher does when something is heard.
+
+    Attributes
+    ----------
+    look_for_work
+        A job waits in a lane.
+    forget
+        A job has ended elsewhere, by its id.
+    stop
+        A job that runs here should stop.
+    give_back
+        The table has a job, in this attempt, as one that runs here, but it does not.
+    look_after
+        It is time to look for jobs that nobody runs.
+    """
+
+    look_for_work: Callable[[Lane], None]
+    forget: Callable[[str], None]
+    stop: Callable[[Run], None]
+    give_back: Callable[[str, int], Awaitable[None]]
+    look_after: Callable[[], Awaitable[None]]
 
 
 class Company(Protocol):
@@ -18,8 +46,8 @@ class Company(Protocol):
     others_may_wait: bool
     """Whether there may be waiting jobs that this service has not heard of."""
 
-    async def join(self) -> None:
-        """Begin, before the first job is taken."""
+    async def join(self, reactions: Reactions) -> None:
+        """Begin, before the first job is taken, and react from then on to what is heard."""
 
     async def leave(self) -> None:
         """End, after the last job was settled or put back."""
@@ -51,8 +79,8 @@ class Alone:
     def __init__(self, owner: str) -> None:
         self._owner = owner
 
-    async def join(self) -> None:
-        """Do nothing."""
+    async def join(self, reactions: Reactions) -> None:
+        """Do nothing: nothing is ever heard."""
 
     async def leave(self) -> None:
         """Do nothing."""

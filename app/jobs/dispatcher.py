@@ -11,12 +11,13 @@ import logging
 import time
 from collections.abc import Coroutine, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 from structlog.contextvars import bind_contextvars
 
 from app.jobs.channel import Channels
-from app.jobs.company import Alone, Company
+from app.jobs.company import Reactions
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor
 from app.jobs.housekeeping import Housekeeping
@@ -24,11 +25,12 @@ from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
 from app.jobs.observer import JobObserver
-from app.jobs.reading import Database
+from app.jobs.recovery import Recovery
 from app.jobs.run import Run
 from app.jobs.settling import Settling
-from app.jobs.shared import Reactions, Shared
+from app.jobs.shared import company_on
 from app.jobs.store import Claim, JobStore, QueueLimit
+from app.jobs.waiting import Waiting
 from app.jobs.writer import Writer
 from app.logs import labels
 
@@ -80,26 +82,50 @@ class Dispatcher:
         self._settling = Settling(store, self._writer, self._kinds, overrun_grace_s)
         self._lanes = Lanes(executor.capacity)
         self._runs: dict[str, Run] = {}
+        self._wake = asyncio.Event()
+        self._company = company_on(store.database, owner, lease_s, self._writer, self._runs, channels)
         self._last_minute = LastMinute(self._answer_at_once)
+        self._waiting = Waiting(
+            self._lanes,
+            self._kinds,
+            None if reserve is None else self._last_minute,
+            self._company,
+            self._wake,
+        )
+        self._recovery = Recovery(
+            store,
+            self._writer,
+            self._kinds,
+            self._company,
+            self._waiting,
+            partial(self._tell_end, ran_s=None),
+        )
         self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
-        self._company = self._company_on(store.database, owner, lease_s)
-        self._house = Housekeeping(store, self._writer, self._runs.values, self._look_after, retention_s)
+        self._house = Housekeeping(
+            store, self._writer, self._runs.values, self._recovery.look_after, retention_s
+        )
         self._housekeeping: asyncio.Task[None] | None = None
-        self._unsettled: list[Run] = []
         # Of the jobs that wait or run; one that an earlier process took in has lost its request's id.
         self._labels: dict[str, dict[str, str]] = {}
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
-        self._wake = asyncio.Event()
         self._accepting = False
         self._ended = asyncio.Event()
 
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work."""
         await self._writer.write(self._store.migrate)
-        await self._company.join()
-        await self._recover()
+        await self._company.join(
+            Reactions(
+                self._waiting.heard,
+                self._waiting.forget,
+                lambda run: run.stop(self._grace_s),
+                self._recovery.give_back,
+                self._recovery.look_after,
+            )
+        )
+        await self._recovery.look_after()
         for lane in LANES:
             durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
             self._lanes.ran(lane, durations)
@@ -181,7 +207,6 @@ class Dispatcher:
         except BaseException:
             if run_now:
                 self._give_back(lane)
-                self._wake.set()
             raise
         if created:
             _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
@@ -189,10 +214,9 @@ class Dispatcher:
         if created and run_now:
             self._begin(claim)
         elif created:
-            self._waits(claim.job, claim.deadline)
+            self._waiting.more(claim.job, claim.deadline)
         elif run_now:
             self._give_back(lane)
-            self._wake.set()
         return claim.job, created
 
     def _running(self, lane: Lane) -> Iterator[tuple[float, float | None]]:
@@ -212,8 +236,7 @@ class Dispatcher:
     async def _cancel(self, job_id: str) -> Job:
         job, before = await self._writer.write(self._store.cancel, job_id)
         if before is JobStatus.QUEUED:
-            self._waits_no_more(job)
-            self._wake.set()
+            self._waiting.less(job)
             self._tell_end(job, None)
         run = self._runs.get(job_id)
         if before is JobStatus.RUNNING and run is not None:
@@ -250,6 +273,7 @@ class Dispatcher:
             self._wake.clear()
             while self._accepting and (lane := self._lanes.next_lane(self._executor.ready)) is not None:
                 self._lanes.running[lane] += 1
+                self._waiting.looks(lane)
                 try:
                     claim = await self._writer.write(self._store.claim, lane)
                 except Exception:
@@ -258,35 +282,18 @@ class Dispatcher:
                     await asyncio.sleep(_PAUSE_S)
                     continue
                 if claim is None:
-                    self._lanes.waiting[lane] = 0
+                    self._waiting.found_none(lane)
                     self._lanes.running[lane] -= 1
                 else:
-                    self._waits_no_more(claim.job)
+                    self._waiting.less(claim.job)
                     self._begin(claim)
-
-    def _waits(self, job: Job, deadline: float | None) -> None:
-        """Take note of one more job that waits, and tell the others who could take it."""
-        self._lanes.waiting[job.lane] += 1
-        self._watch(job.id, job.kind, deadline)
-        self._company.tell_waiting(job.lane)
-
-    def _watch(self, job_id: str, kind: str, deadline: float | None) -> None:
-        known = self._kinds.get(kind)
-        if self._reserve is not None and deadline is not None and known is not None and known.at_once:
-            self._last_minute.watch(job_id, deadline)
-
-    def _waits_no_more(self, job: Job) -> None:
-        # Where others submit too, nothing waits only once nothing was found.
-        least = int(self._company.others_may_wait)
-        self._lanes.waiting[job.lane] = max(least, self._lanes.waiting[job.lane] - 1)
-        self._last_minute.forget(job.id)
 
     async def _answer_at_once(self, job_id: str) -> bool:
         """Answer a job that waits and whose time is up, beside the workers; False if it does not wait."""
         claim = await self._writer.write(self._store.claim_this, job_id)
         if claim is None:
             return False
-        self._waits_no_more(claim.job)
+        self._waiting.less(claim.job)
         await asyncio.wait([self._begin(claim, at_once=True)])
         return True
 
@@ -336,7 +343,7 @@ class Dispatcher:
             job = await self._settling.settle(run, outcome)
         except Exception:
             _log.exception("a job's end could not be stored; once something can be, it is given back")
-            self._unsettled.append(run)
+            self._recovery.unsettled(run)
         else:
             if job is None:
                 _log.warning("a job went on without attempt %d", run.job.attempt)
@@ -346,13 +353,12 @@ class Dispatcher:
         if job is not None and job.status.finished:
             self._tell_end(job, took)
         elif job is not None:
-            self._waits(job, run.deadline)
+            self._waiting.more(job, run.deadline)
         else:
             # It goes on elsewhere: who listens has to look there.
             run.channel.ring()
         if not run.at_once:
             self._give_back(run.job.lane)
-        self._wake.set()
 
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
@@ -373,60 +379,7 @@ class Dispatcher:
 
     def _give_back(self, lane: Lane) -> None:
         self._lanes.running[lane] -= 1
-
-    async def _look_after(self) -> None:
-        """Give back the jobs whose end could not be stored, and those of other processes that have died."""
-        while self._unsettled:
-            run = self._unsettled[0]
-            reason = "its end could not be stored"
-            job = await self._writer.write(
-                self._store.lose, run.job.id, run.job.attempt, reason, run.progress
-            )
-            self._unsettled.pop(0)
-            if job is not None and job.status.finished:
-                self._tell_end(job, None)
-        await self._recover()
         self._wake.set()
-
-    async def _recover(self) -> None:
-        changed = await self._writer.write(self._store.recover, tuple(self._kinds), self._company.is_alive)
-        for job in changed:
-            _log.warning(
-                "a job was left behind by an earlier process",
-                extra={"job_id": job.id, "status": job.status.value},
-            )
-            if job.status.finished:
-                self._tell_end(job, None)
-            else:
-                self._company.tell_waiting(job.lane)
-        waiting = await self._writer.write(self._store.waiting)
-        self._lanes.waiting = {lane: waiting.get(lane, 0) for lane in LANES}
-        for job_id, kind, deadline in await self._writer.write(self._store.deadlines):
-            self._watch(job_id, kind, deadline)
-
-    def _company_on(self, database: Database, owner: str, lease_s: float) -> Company:
-        if not database.shared:
-            return Alone(owner)
-
-        def look_for_work(lane: Lane) -> None:
-            self._lanes.waiting[lane] = max(1, self._lanes.waiting[lane])
-            self._wake.set()
-
-        reactions = Reactions(
-            look_for_work, lambda run: run.stop(self._grace_s), self._release_forgotten, self._look_after
-        )
-        return Shared(database, owner, lease_s, self._writer, self._runs, self._channels, reactions)
-
-    async def _release_forgotten(self, job_id: str, attempt: int) -> None:
-        """Put back a job that was taken in a commit of which this service never learned."""
-        if any(run.job.id == job_id for run in self._unsettled):
-            return
-        job = await self._writer.write(self._store.release, job_id, attempt, Progress())
-        if job is not None and job.status.finished:
-            self._tell_end(job, None)
-        elif job is not None:
-            self._company.tell_waiting(job.lane)
-            await self._look_after()
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

@@ -10,7 +10,7 @@ import asyncio
 import logging
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from statistics import fmean
 
 from app.jobs.channel import rung
@@ -43,6 +43,11 @@ class LastMinute:
     def watch(self, job_id: str, deadline: float) -> None:
         """Take note of a job that waits, and when its time is up, in seconds since 1970."""
         self._deadlines[job_id] = deadline
+        self._changed.set()
+
+    def watch_only(self, deadlines: Mapping[str, float]) -> None:
+        """Take note of all the jobs that wait, by their id, and of no others."""
+        self._deadlines = dict(deadlines)
         self._changed.set()
 
     def forget(self, job_id: str) -> None:

@@ -10,10 +10,10 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from app.jobs.channel import Channels, rung
+from app.jobs.company import Alone, Company, Reactions
 from app.jobs.lease import Held, Lease
 from app.jobs.model import LANES, Lane
 from app.jobs.reading import Announcements, Database
@@ -23,28 +23,6 @@ from app.jobs.writer import Writer
 _CHANNEL = "allocator_jobs"
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Reactions:
-    """What the dispatcher does when something is heard.
-
-    Attributes
-    ----------
-    look_for_work
-        A job waits in a lane.
-    stop
-        A job that runs here should stop.
-    give_back
-        The table has a job, in this attempt, as one that runs here, but it does not.
-    look_after
-        It is time to look for jobs that nobody runs.
-    """
-
-    look_for_work: Callable[[Lane], None]
-    stop: Callable[[Run], None]
-    give_back: Callable[[str, int], Awaitable[None]]
-    look_after: Callable[[], Awaitable[None]]
 
 
 class Shared:
@@ -60,8 +38,6 @@ class Shared:
         The jobs that run here, by their id.
     channels
         Who listens here to which job.
-    reactions
-        What is done when something is heard.
     """
 
     others_may_wait = True
@@ -74,7 +50,6 @@ class Shared:
         writer: Writer,
         runs: Mapping[str, Run],
         channels: Channels,
-        reactions: Reactions,
     ) -> None:
         self._database = database
         self._lease = Lease(database, owner, lease_s)
@@ -82,22 +57,21 @@ class Shared:
         self._writer = writer
         self._runs = runs
         self._channels = channels
-        self._reactions = reactions
         self._announcements: Announcements | None = None
         self._living: asyncio.Task[None] | None = None
         self._ended = asyncio.Event()
 
-    async def join(self) -> None:
+    async def join(self, reactions: Reactions) -> None:
         """Show this service among the living, and begin to listen."""
         await self._writer.write_surely(self._lease.show)
         loop = asyncio.get_running_loop()
 
         def heard(message: str | None) -> None:
             with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(self._hear, message)
+                loop.call_soon_threadsafe(self._hear, message, reactions)
 
         self._announcements = await asyncio.to_thread(self._database.announcements, _CHANNEL, heard)
-        self._living = asyncio.create_task(self._live())
+        self._living = asyncio.create_task(self._live(reactions))
 
     async def leave(self) -> None:
         """Say nothing any more, and be forgotten."""
@@ -129,40 +103,38 @@ class Shared:
         if self._announcements is not None:
             self._announcements.tell(f"{what} {of}")
 
-    def _hear(self, message: str | None) -> None:
+    def _hear(self, message: str | None, reactions: Reactions) -> None:
         what, _, of = (message or "").partition(" ")
         match what:
             case "waiting":
-                self._heard_waiting(of)
+                for lane in LANES:
+                    if lane == of:
+                        reactions.look_for_work(lane)
             case "ended":
+                reactions.forget(of)
                 self._channels.look_again(of)
             case "cancelled" if of in self._runs:
-                self._reactions.stop(self._runs[of])
+                reactions.stop(self._runs[of])
             case "":
                 # Something may have been missed.
                 for lane in LANES:
-                    self._reactions.look_for_work(lane)
+                    reactions.look_for_work(lane)
                 self._channels.ring()
 
-    def _heard_waiting(self, lane: str) -> None:
-        for known in LANES:
-            if known == lane:
-                self._reactions.look_for_work(known)
-
-    async def _live(self) -> None:
+    async def _live(self, reactions: Reactions) -> None:
         """Give signs of life until the end, and see in the table what was not heard."""
         looked = time.monotonic()
         while not self._ended.is_set():
             await rung(self._ended, self._lease.pause_s)
             try:
-                await self._compare()
+                await self._compare(reactions)
                 if time.monotonic() - looked >= self._lease_s:
                     looked = time.monotonic()
-                    await self._reactions.look_after()
+                    await reactions.look_after()
             except Exception:
                 _log.exception("no sign of life could be given; there will be another try")
 
-    async def _compare(self) -> None:
+    async def _compare(self, reactions: Reactions) -> None:
         """Show that this service lives, and bring what runs here and what the table says of it together.
 
         They differ where a connection was cut in the midst of a commit, of which nobody knows then whether
@@ -178,7 +150,21 @@ class Shared:
                 _log.warning("a job was given to another service", extra={"job_id": job_id})
                 run.kill("gone")
             elif mine.cancel_requested:
-                self._reactions.stop(run)
+                reactions.stop(run)
         for job_id, mine in held.items():
             if job_id not in self._runs and job_id not in before:
-                await self._reactions.give_back(job_id, mine.attempt)
+                await reactions.give_back(job_id, mine.attempt)
+
+
+def company_on(
+    database: Database,
+    owner: str,
+    lease_s: float,
+    writer: Writer,
+    runs: Mapping[str, Run],
+    channels: Channels,
+) -> Company:
+    """Return whom an owner shares a database with: nobody, or others; see :class:`Shared`."""
+    if not database.shared:
+        return Alone(owner)
+    return Shared(database, owner, lease_s, writer, runs, channels)
