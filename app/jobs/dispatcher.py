@@ -100,6 +100,7 @@ class Dispatcher:
             self._waiting,
             partial(self._tell_end, ran_s=None),
         )
+        self._reserve_ready = asyncio.Event()
         self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
         self._house = Housekeeping(
@@ -132,7 +133,7 @@ class Dispatcher:
         self._accepting = True
         await self._executor.start(self._wake.set)
         if self._reserve is not None:
-            await self._reserve.start(lambda: None)
+            await self._reserve.start(self._reserve_ready.set)
         self._wake.set()
         self._dispatching = asyncio.create_task(self._dispatch())
         self._housekeeping = asyncio.create_task(self._house.keep())
@@ -143,6 +144,7 @@ class Dispatcher:
         self._accepting = False
         self._wake.set()
         self._last_minute.end()
+        self._reserve_ready.set()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
         if self._requests:
             await asyncio.wait(self._requests)
@@ -288,14 +290,19 @@ class Dispatcher:
                     self._waiting.less(claim.job)
                     self._begin(claim)
 
-    async def _answer_at_once(self, job_id: str) -> bool:
-        """Answer a job that waits and whose time is up, beside the workers; False if it does not wait."""
+    async def _answer_at_once(self, job_id: str) -> float | None:
+        """Answer a job whose time is up while it waits, beside the workers; return the seconds it took."""
+        # Taken before a process has started to answer it, it could be out of its grace by then.
+        while self._accepting and self._reserve is not None and self._reserve.ready == 0:
+            self._reserve_ready.clear()
+            await self._reserve_ready.wait()
+        begun = time.monotonic()
         claim = await self._writer.write(self._store.claim_this, job_id)
         if claim is None:
-            return False
+            return None
         self._waiting.less(claim.job)
         await asyncio.wait([self._begin(claim, at_once=True)])
-        return True
+        return time.monotonic() - begun
 
     def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.

@@ -30,10 +30,10 @@ class LastMinute:
     Parameters
     ----------
     answer
-        Answers a job if it still waits, and says whether it did.
+        Answers a job if it still waits, and returns how many seconds that took; None if it did not wait.
     """
 
-    def __init__(self, answer: Callable[[str], Awaitable[bool]]) -> None:
+    def __init__(self, answer: Callable[[str], Awaitable[float | None]]) -> None:
         self._answer = answer
         self._deadlines: dict[str, float] = {}
         self._took: deque[float] = deque(maxlen=_REMEMBERED)
@@ -72,10 +72,10 @@ class LastMinute:
                 continue
             job_id = min(self._deadlines, key=self._deadlines.__getitem__)
             deadline = self._deadlines.pop(job_id)
-            begun = time.monotonic()
             try:
-                if await self._answer(job_id):
-                    self._took.append(time.monotonic() - begun)
+                took_s = await self._answer(job_id)
+                if took_s is not None:
+                    self._took.append(took_s)
             except Exception:
                 _log.exception("a job's time is up and it could not be answered; there will be another try")
                 self._deadlines.setdefault(job_id, deadline)

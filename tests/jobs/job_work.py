@@ -138,6 +138,17 @@ def warm_up() -> None:
     os.environ["WARM"] = "1"
 
 
+def never() -> None:
+    """Warm up for as long as the process lives."""
+    threading.Event().wait()
+
+
+def until_gate() -> None:
+    """Warm up until a file is there."""
+    while not Path(os.environ["GATE"]).exists():
+        time.sleep(0.002)
+
+
 def warm_up_at_second_try() -> None:
     """Fail in the first worker, which leaves a file behind."""
     marker = Path(os.environ["WARM_UP_MARKER"])

@@ -130,3 +130,20 @@ def test_one_that_an_earlier_process_took_in_is_answered_too(tmp_path):
             Path(gate(tmp_path)["path"]).touch()
 
     asyncio.run(scenario())
+
+
+def test_what_waits_is_not_taken_before_something_can_answer_it(tmp_path):
+    async def scenario():
+        cold = LocalExecutor(1, warm_up="job_work:until_gate", environment={"GATE": gate(tmp_path)["path"]})
+        async with running(tmp_path, kinds=HASTY, reserve=cold) as service:
+            holder, _ = await service.submit("until_file", gate(tmp_path))
+            job, _ = await service.submit("hasty", gate(tmp_path), time_limit_s=0.0)
+            other, _ = await service.submit("hasty", {}, time_limit_s=0.0)
+            await service.cancel(other.id)
+            assert (await service.get(job.id)).status is JobStatus.QUEUED
+            assert (await service.get(other.id)).attempt == 0
+            Path(gate(tmp_path)["path"]).touch()
+            assert (await finished(service, job)).result
+            assert (await finished(service, holder)).result
+
+    asyncio.run(scenario())

@@ -4,18 +4,20 @@ import asyncio
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from pathlib import Path
 from signal import SIGINT, SIGKILL, SIGQUIT
 
 import pytest
 import sqlalchemy as sa
-from harness import GATED, KINDS, LEASE_S, PATIENCE_S, eventually, finished, reports, running
+from harness import GATED, KINDS, LEASE_S, PATIENCE_S, eventually, finished, make_service, reports, running
 from postgresql_server import PostgresqlServer
 from sqlalchemy.exc import OperationalError
 
 from app.jobs.errors import QueueFull
 from app.jobs.lease import Lease
+from app.jobs.local import LocalExecutor
 from app.jobs.model import Idempotency, JobKind, JobStatus
 from app.jobs.store import JobStore, QueueLimit
 from policy_store.database import Database
@@ -30,7 +32,7 @@ def url(postgresql):
 
 @asynccontextmanager
 async def two_services(url, **settings):
-    options = {"lease_s": LEASE_S, "max_queued": 1000, **settings}
+    options = {"max_queued": 1000, **settings}
     async with running(url, **options) as one, running(url, **options) as other:
         yield one, other
 
@@ -129,6 +131,56 @@ def test_one_key_makes_one_job_and_the_queue_has_one_limit_for_all(url, tmp_path
     asyncio.run(scenario())
 
 
+def test_of_those_who_take_a_job_out_of_its_turn_at_once_one_gets_it(url):
+    stores = [JobStore(Database(url), name, 3) for name in ("one", "other")]
+    stores[0].migrate()
+    hasty = JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:note")
+    with ThreadPoolExecutor(2) as threads:
+        for _ in range(50):
+            taken_in, _ = stores[0].insert(hasty, {}, run_now=False, limit=QueueLimit(100, 1.0))
+            claims = list(threads.map(lambda store, job_id=taken_in.job.id: store.claim_this(job_id), stores))
+            [claim] = [claim for claim in claims if claim is not None]
+            assert (claim.job.id, claim.job.attempt) == (taken_in.job.id, 1)
+    for store in stores:
+        store.database.dispose()
+
+
+def test_one_whose_time_is_up_is_answered_once_though_several_watch_over_it(url, tmp_path):
+    log, gate = tmp_path / "log", tmp_path / "gate"
+    hasty = (*KINDS, JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:note"))
+
+    async def scenario():
+        options = {"kinds": hasty, "max_queued": 1000}
+        async with running(url, **options) as busy:
+            await busy.submit("until_file", {"path": str(gate)})
+            jobs = [
+                (
+                    await busy.submit(
+                        "hasty", {"log": str(log), "number": number, "path": str(gate)}, time_limit_s=0.0
+                    )
+                )[0]
+                for number in range(40)
+            ]
+
+            # Neither has a worker that becomes free, so all is answered beside those, by both at a time.
+            def slow():
+                cold = LocalExecutor(1, warm_up="job_work:never")
+                return {**options, "reserve": LocalExecutor(1), "executor": cold}
+
+            databases = [Database(url) for _ in range(2)]
+            services = [make_service(database, **slow()) for database in databases]
+            await asyncio.gather(*(service.start() for service in services))
+            done = [await finished(busy, job) for job in jobs]
+            await asyncio.gather(*(service.stop(0.0) for service in services))
+            for database in databases:
+                database.dispose()
+            gate.touch()
+        assert {(job.status, job.attempt) for job in done} == {(JobStatus.SUCCEEDED, 1)}
+        assert Counter(log.read_text().split()) == Counter(map(str, range(40)))
+
+    asyncio.run(scenario())
+
+
 def test_what_a_killed_service_ran_is_done_by_the_others(url, tmp_path):
     make_completions(url)
     gate = tmp_path / "gate"
@@ -178,7 +230,7 @@ def test_a_restart_of_the_database_loses_nothing(how, tmp_path):
                     await asyncio.sleep(0.05)
 
         async def scenario():
-            async with two_services(url, kinds=(*KINDS, counted)) as services:
+            async with two_services(url, kinds=(*KINDS, counted), lease_s=LEASE_S) as services:
                 gate = asyncio.Event()
 
                 async def client(number):
@@ -263,7 +315,7 @@ def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(url):
 
 def test_a_service_that_was_taken_for_dead_gives_up_its_work(url, tmp_path):
     async def scenario():
-        async with two_services(url) as (one, other):
+        async with two_services(url, lease_s=LEASE_S) as (one, other):
             job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
             await reports(one, job)
             # As another service does that has not seen this one for too long.

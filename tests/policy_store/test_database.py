@@ -11,11 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
+from app.api import stored_json
 from policy_store.database import Database
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
 from policy_store.library import PolicyLibrary
@@ -357,3 +359,30 @@ def test_the_store_imports_neither_the_application_nor_torch() -> None:
         print(sorted({"app", "torch", "numba", "fastapi"} & sys.modules.keys()))
     """
     assert start(program).communicate(timeout=60) == ("[]\n", "")
+
+
+@pytest.mark.parametrize("value", [{"n": [1, 2.5, None, True], "s": "ä€😀"}, "\ud800", {"z": "\x00"}, None])
+def test_json_is_written_and_read_as_the_opener_says(any_database_url: str, value: object) -> None:
+    calls = []
+
+    def write(value: object) -> str:
+        calls.append("write")
+        return stored_json.write(value)
+
+    def read(text: str) -> object:
+        calls.append("read")
+        return stored_json.read(text)
+
+    table = sa.Table("notes", sa.MetaData(), sa.Column("body", sa.JSON(none_as_null=False)))
+    opened = [Database(any_database_url), Database(any_database_url, write, read)]
+    with opened[0].write() as connection:
+        table.create(connection)
+    for database in opened:
+        with database.write() as connection:
+            connection.execute(sa.insert(table).values(body=value))
+    assert calls == ["write"]
+    for database in opened:
+        with database.read() as connection:
+            assert connection.scalars(sa.select(table.c.body)).all() == [value, value]
+        database.dispose()
+    assert calls == ["write", "read", "read"]
