@@ -11,6 +11,8 @@ import pytest
 from app.api.access.guard import needed_role
 from app.api.access.keys import KeyStore, Role, metadata, recognise
 from app.api.application import create_application
+from app.api.batch import Batches
+from app.api.job_kinds import BATCH
 from app.api.metrics import Metrics
 from app.api.services import Services
 from app.jobs.local import LocalExecutor
@@ -39,7 +41,13 @@ class Caller:
         self.app = create_application(settings)
         jobs = JobService(database, [], LocalExecutor(1))
         self.app.state.services = Services(
-            settings, database, PolicyLibrary(database), jobs, KeyStore(database), Metrics()
+            settings,
+            database,
+            PolicyLibrary(database),
+            jobs,
+            Batches(jobs, BATCH),
+            KeyStore(database),
+            Metrics(),
         )
 
     def request(self, method, path, **options):
