@@ -6,6 +6,8 @@ from app.api.openapi_examples import example_problem
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.records import problem_from_record, problem_to_record
 from app.jobs import work
+from app.jobs.answer_time import AnswerTime
+from app.jobs.time_limit import TimeLimit
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.settings import Settings
 
@@ -57,8 +59,10 @@ def test_a_cancelled_search_has_a_bound_too():
 def test_a_share_of_the_time_limit_is_kept_for_it():
     problem = problem_from_record(payload()["problem"])
     search_only, with_bound = (
-        work._stop(problem, WorkContext.in_process(lambda _progress: None, 6.0), limit).seconds_left()
-        for limit in (None, 100.0)
+        TimeLimit(
+            WorkContext.in_process(lambda _progress: None, 6.0), AnswerTime(), problem, bound_limit_s
+        ).searching.seconds_left()
+        for bound_limit_s in (None, 100.0)
     )
 
     assert with_bound == pytest.approx(search_only * 2 / 3, rel=0.05)
