@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 import ctypes
 import itertools
-import logging
 import math
 import multiprocessing
 import os
@@ -27,10 +26,10 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from app.jobs import worker
-from app.jobs.channel import rung
 from app.jobs.executor import Lost, Outcome, Raised
 from app.jobs.failure import describe
 from app.jobs.model import Progress
+from app.jobs.slots import SlotExecution, SlotExecutor
 from app.jobs.work_context import CANCEL, DEADLINE, new_control
 
 # The workers share the cores: one that starts threads of its own slows the others down, and itself.
@@ -40,14 +39,11 @@ SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM
 # system than all the work that is done in it, and what a worker takes stays what its largest job took.
 KEEPS_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 1024**2), "MALLOC_TRIM_THRESHOLD_": str(512 * 1024**2)}
 
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
-
-_log = logging.getLogger(__name__)
 _spawning = threading.Lock()
 _serials = itertools.count(1)
 
 
-class LocalExecutor:
+class LocalExecutor(SlotExecutor["_Worker"]):
     """Runs work in processes of this machine.
 
     Parameters
@@ -73,38 +69,10 @@ class LocalExecutor:
         environment: Mapping[str, str] = MappingProxyType(SINGLE_THREADED | KEEPS_MEMORY),
         log_level: str | None = None,
     ) -> None:
-        if slots < 1:
-            raise ValueError(f"slots is {slots}, but at least one worker is needed")
-        self._slots = slots
+        super().__init__(slots)
         self._warm_up = partial(worker.warm_up, warm_up, *warm_up_arguments)
         self._environment = dict(environment)
         self._log_level = log_level
-        self._workers: set[_Worker] = set()
-        self._ready: set[_Worker] = set()
-        self._free: asyncio.Queue[_Worker] = asyncio.Queue()
-        self._executions: set[_LocalExecution] = set()
-        self._closing = asyncio.Event()
-        self._restarts = 0
-        self._keepers: list[asyncio.Task[None]] = []
-
-    @property
-    def capacity(self) -> int:
-        """How many pieces of work run at a time."""
-        return self._slots
-
-    @property
-    def ready(self) -> int:
-        """How many workers are warm, whether they work or not."""
-        return len(self._ready)
-
-    @property
-    def restarts(self) -> int:
-        """How many workers have been replaced."""
-        return self._restarts
-
-    async def start(self, on_ready: Callable[[], None]) -> None:
-        """Begin to start the workers; ``on_ready`` is called for each, and for each that replaces one."""
-        self._keepers = [asyncio.create_task(self._keep_slot(on_ready)) for _ in range(self._slots)]
 
     def submit(
         self,
@@ -119,61 +87,20 @@ class LocalExecutor:
         execution = _LocalExecution(
             self._free, partial(worker.run, dict(labels), work, payload), time_left_s, on_progress
         )
-        self._executions.add(execution)
-        execution.task.add_done_callback(lambda _task: self._executions.discard(execution))
+        self._keep(execution)
         return execution
 
-    async def close(self) -> None:
-        """Kill all workers; work that was not awaited is lost."""
-        self._closing.set()
-        for execution in tuple(self._executions):
-            execution.kill()
-        for each in tuple(self._workers):
-            each.kill()
-        await asyncio.gather(*self._keepers)
-
-    async def _keep_slot(self, on_ready: Callable[[], None]) -> None:
-        """Keep one worker alive until the executor closes."""
-        pause = _FIRST_PAUSE_S
-        while not self._closing.is_set():
-            if await self._live_once(on_ready):
-                pause = _FIRST_PAUSE_S
-            else:
-                await rung(self._closing, pause)
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
-            if not self._closing.is_set():
-                self._restarts += 1
-
-    async def _live_once(self, on_ready: Callable[[], None]) -> bool:
-        """Start one worker and stay until it is gone; False if it never became warm."""
-        slot = _Worker(self._log_level)
-        self._workers.add(slot)
-        try:
-            await asyncio.to_thread(slot.start, self._warm_up, self._environment)
-            if not self._closing.is_set():
-                self._ready.add(slot)
-                self._free.put_nowait(slot)
-                on_ready()
-                await slot.gone.wait()
-                if not self._closing.is_set():
-                    _log.warning("a worker is gone and is replaced", extra={"worker_pid": slot.pid})
-        except Exception:
-            if not self._closing.is_set():
-                _log.exception("a worker could not be started; there will be another try")
-            return False
-        else:
-            return True
-        finally:
-            self._ready.discard(slot)
-            slot.kill()
-            await asyncio.to_thread(slot.discard)
-            self._workers.discard(slot)
+    def _new_worker(self) -> _Worker:
+        return _Worker(self._log_level, self._warm_up, self._environment)
 
 
 class _Worker:
     """A worker process as its parent sees it: pool, progress pipe, control block."""
 
-    def __init__(self, log_level: str | None) -> None:
+    def __init__(
+        self, log_level: str | None, warm_up: Callable[[], int], environment: Mapping[str, str]
+    ) -> None:
+        self._warm_up, self._environment = warm_up, environment
         context = multiprocessing.get_context("spawn")
         self._pipe, self._their_end = context.Pipe(duplex=False)
         self.control: MutableSequence[float] = cast(
@@ -190,9 +117,21 @@ class _Worker:
         self._loop = asyncio.get_running_loop()
         self._reader = threading.Thread(target=self._read, name="worker-progress", daemon=True)
 
-    def start(self, warm_up: Callable[[], int], environment: Mapping[str, str]) -> None:
-        """Start the process and wait until it is warm; blocks."""
-        with _environment(environment):
+    @property
+    def name(self) -> str:
+        """Its process."""
+        return str(self.pid)
+
+    async def warm_up(self) -> None:
+        """Start the process and wait until it is warm."""
+        await asyncio.to_thread(self._start)
+
+    async def stay(self) -> None:
+        """Wait until the process is gone."""
+        await self.gone.wait()
+
+    def _start(self) -> None:
+        with _environment(self._environment):
             pid = self.pool.submit(os.getpid)
         # Once only the worker has the other end, the pipe closes when the worker dies.
         self._their_end.close()
@@ -200,7 +139,7 @@ class _Worker:
         self.pid = pid.result()
         if self._doomed:
             self.kill()
-        self.pool.submit(warm_up).result()
+        self.pool.submit(self._warm_up).result()
 
     def begin(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
         """Route the progress of the work with this serial number."""
@@ -219,8 +158,12 @@ class _Worker:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, signal.SIGKILL)
 
-    def discard(self) -> None:
-        """Wait for the end of a process that was killed or has died; blocks."""
+    async def discard(self) -> None:
+        """Kill the process and wait for its end."""
+        self.kill()
+        await asyncio.to_thread(self._clear_away)
+
+    def _clear_away(self) -> None:
         self.pool.shutdown(wait=True)
         self._their_end.close()
         if self._reader.is_alive():
@@ -244,8 +187,8 @@ class _Worker:
             self._on_progress(progress)
 
 
-class _LocalExecution:
-    """One piece of work, from waiting for a worker to its outcome."""
+class _LocalExecution(SlotExecution[_Worker]):
+    """Work in a process of this machine."""
 
     def __init__(
         self,
@@ -254,35 +197,16 @@ class _LocalExecution:
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
     ) -> None:
-        self._free = free
         self._run_with = run
         self._deadline = math.inf if time_left_s is None else time.monotonic() + time_left_s
         self._on_progress = on_progress
-        self._cancelled = False
-        self._worker: _Worker | None = None
-        self.task = asyncio.create_task(self._run())
-
-    async def outcome(self) -> Outcome:
-        """Wait until the work has ended."""
-        try:
-            return await asyncio.shield(self.task)
-        except asyncio.CancelledError:
-            if self.task.cancelled():
-                return Lost("it was stopped before a worker was free")
-            raise
+        super().__init__(free)
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
         self._cancelled = True
         if self._worker is not None:
             self._worker.control[CANCEL] = 1.0
-
-    def kill(self) -> None:
-        """Kill the worker, or give up waiting for one."""
-        if self._worker is not None:
-            self._worker.kill()
-        else:
-            self.task.cancel()
 
     async def _run(self) -> Outcome:
         while True:

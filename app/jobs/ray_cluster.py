@@ -23,29 +23,27 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from app.jobs.channel import rung
 from app.jobs.executor import Lost, Outcome, Raised
 from app.jobs.failure import describe
 from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED
 from app.jobs.model import Progress
 from app.jobs.ray_worker import REPORT_INTERVAL_S, RayWorker
+from app.jobs.slots import SlotExecution, SlotExecutor
 from app.jobs.worker import Ended
 
 OWN_CLUSTER = "local"
 """An address for which a cluster is started on this machine, and ended with the executor."""
 
-_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
 _UNHEARD_S = 0.05
 """Work that has ended by then is not asked for its progress; the last one comes with its end."""
 
 _TALK = "talk"
 _TALKERS = 4
 
-_log = logging.getLogger(__name__)
 _serials = itertools.count(1)
 
 
-class RayExecutor:
+class RayExecutor(SlotExecutor["_Worker"]):
     """Runs work in actors of a Ray cluster.
 
     Parameters
@@ -77,9 +75,7 @@ class RayExecutor:
         environment: Mapping[str, str] = MappingProxyType(SINGLE_THREADED | KEEPS_MEMORY),
         log_level: str | None = None,
     ) -> None:
-        if slots < 1:
-            raise ValueError(f"slots is {slots}, but at least one worker is needed")
-        self._slots = slots
+        super().__init__(slots)
         self._address = address
         self._resources = dict(resources)
         self._warm_up = warm_up, *warm_up_arguments
@@ -87,28 +83,6 @@ class RayExecutor:
         self._log_level = log_level
         self._ray: ModuleType | None = None
         self._connected_here = False
-        self._workers: set[_Worker] = set()
-        self._ready: set[_Worker] = set()
-        self._free: asyncio.Queue[_Worker] = asyncio.Queue()
-        self._executions: set[_RayExecution] = set()
-        self._closing = asyncio.Event()
-        self._restarts = 0
-        self._keepers: list[asyncio.Task[None]] = []
-
-    @property
-    def capacity(self) -> int:
-        """How many pieces of work run at a time when the cluster has a place for every worker."""
-        return self._slots
-
-    @property
-    def ready(self) -> int:
-        """How many workers are warm, whether they work or not."""
-        return len(self._ready)
-
-    @property
-    def restarts(self) -> int:
-        """How many workers have been replaced."""
-        return self._restarts
 
     async def start(self, on_ready: Callable[[], None]) -> None:
         """Connect to the cluster and begin to start the workers; ``on_ready`` is called for each.
@@ -123,7 +97,7 @@ class RayExecutor:
         # Not in a thread: Ray insists on setting up signals, which only the main thread can.
         with _kept_signals():
             self._ray = self._connect()
-        self._keepers = [asyncio.create_task(self._keep_slot(on_ready)) for _ in range(self._slots)]
+        await super().start(on_ready)
 
     def submit(
         self,
@@ -137,18 +111,12 @@ class RayExecutor:
         """Hand work to the next free worker, see :meth:`app.jobs.executor.Executor.submit`."""
         deadline = None if time_left_s is None else time.monotonic() + time_left_s
         execution = _RayExecution(self._free, work, payload, deadline, on_progress, dict(labels))
-        self._executions.add(execution)
-        execution.task.add_done_callback(lambda _task: self._executions.discard(execution))
+        self._keep(execution)
         return execution
 
     async def close(self) -> None:
         """Kill all workers; work that was not awaited is lost."""
-        self._closing.set()
-        for execution in tuple(self._executions):
-            execution.kill()
-        for each in tuple(self._workers):
-            each.kill()
-        await asyncio.gather(*self._keepers)
+        await super().close()
         if self._ray is not None and self._connected_here:
             await asyncio.to_thread(self._ray.shutdown)
 
@@ -168,43 +136,9 @@ class RayExecutor:
             self._connected_here = True
         return ray
 
-    async def _keep_slot(self, on_ready: Callable[[], None]) -> None:
-        """Keep one worker alive until the executor closes."""
-        pause = _FIRST_PAUSE_S
-        while not self._closing.is_set():
-            if await self._live_once(on_ready):
-                pause = _FIRST_PAUSE_S
-            else:
-                await rung(self._closing, pause)
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
-            if not self._closing.is_set():
-                self._restarts += 1
-
-    async def _live_once(self, on_ready: Callable[[], None]) -> bool:
-        """Start one worker and stay until it is gone; False if it never became warm."""
+    def _new_worker(self) -> _Worker:
         assert self._ray is not None
-        slot = _Worker(self._ray, self._resources, self._environment, self._log_level)
-        self._workers.add(slot)
-        try:
-            await slot.warm_up(*self._warm_up)
-            if not self._closing.is_set():
-                self._ready.add(slot)
-                self._free.put_nowait(slot)
-                on_ready()
-                await slot.stay()
-                if not self._closing.is_set():
-                    _log.warning("a worker is gone and is replaced", extra={"worker": slot.name})
-        except Exception:
-            if not self._closing.is_set():
-                _log.exception("a worker could not be started; there will be another try")
-            return False
-        else:
-            return True
-        finally:
-            self._ready.discard(slot)
-            slot.gone = True
-            slot.kill()
-            self._workers.discard(slot)
+        return _Worker(self._ray, self._resources, self._environment, self._log_level, self._warm_up)
 
 
 @contextlib.contextmanager
@@ -230,6 +164,7 @@ class _Worker:
         resources: Mapping[str, float],
         environment: Mapping[str, str],
         log_level: str | None,
+        warm_up: tuple[Any, ...],
     ) -> None:
         others = {name: amount for name, amount in resources.items() if name not in ("CPU", "GPU")}
         self._ray = ray
@@ -243,9 +178,10 @@ class _Worker:
         ).remote(log_level)
         self.name: str = self._actor._actor_id.hex()[:12]
         self.gone = False
+        self._warm_up = warm_up
 
-    async def warm_up(self, hook: str | None, *arguments: Any) -> None:
-        await self._actor.warm_up.remote(hook, *arguments)
+    async def warm_up(self) -> None:
+        await self._actor.warm_up.remote(*self._warm_up)
 
     async def stay(self) -> None:
         """Wait until the process is gone."""
@@ -276,8 +212,12 @@ class _Worker:
         with contextlib.suppress(Exception):  # it is gone, and maybe the cluster too
             self._ray.kill(self._actor)
 
+    async def discard(self) -> None:
+        self.gone = True
+        self.kill()
 
-class _RayExecution:
+
+class _RayExecution(SlotExecution[_Worker]):
     """One piece of work, from waiting for a worker to its outcome."""
 
     def __init__(
@@ -289,37 +229,18 @@ class _RayExecution:
         on_progress: Callable[[Progress], None],
         labels: dict[str, str],
     ) -> None:
-        self._free = free
         self._call = labels, work, payload
         self._deadline = deadline
         self._on_progress = on_progress
         self._newest: Progress | None = None
         self._serial = next(_serials)
-        self._cancelled = False
-        self._worker: _Worker | None = None
-        self.task = asyncio.create_task(self._run())
-
-    async def outcome(self) -> Outcome:
-        """Wait until the work has ended."""
-        try:
-            return await asyncio.shield(self.task)
-        except asyncio.CancelledError:
-            if self.task.cancelled():
-                return Lost("it was stopped before a worker was free")
-            raise
+        super().__init__(free)
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
         self._cancelled = True
         if self._worker is not None:
             self._worker.cancel(self._serial)
-
-    def kill(self) -> None:
-        """Kill the worker, or give up waiting for one."""
-        if self._worker is not None:
-            self._worker.kill()
-        else:
-            self.task.cancel()
 
     async def _run(self) -> Outcome:
         slot = await self._free.get()
