@@ -1,0 +1,22 @@
+"""The command line: start the service and look after it, allocate without it, train, reproduce the paper."""
+
+from __future__ import annotations
+
+import typer
+
+from app.cli.keys import create_key, list_keys, revoke_key
+from app.cli.reproduction import reproduce
+from app.cli.service import allocate, backup, serve
+from app.cli.training import export, train, train_universal
+
+application = typer.Typer(
+    help="Task allocation of UAV swarms with relief materials.", no_args_is_help=True, add_completion=False
+)
+for command in (serve, allocate, train, train_universal, reproduce, export, backup):
+    application.command()(command)
+
+keys = typer.Typer(help="API keys: make, list, revoke.", no_args_is_help=True)
+keys.command("create")(create_key)
+keys.command("list")(list_keys)
+keys.command("revoke")(revoke_key)
+application.add_typer(keys, name="keys")

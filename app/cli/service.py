@@ -1,0 +1,128 @@
+"""Start the service, look after it, allocate without it."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvicorn
+from sqlalchemy import make_url
+
+from app.api.allocation_models import Allocation, AllocationRequest
+from app.api.application import create_application
+from app.api.problem_models import to_problem
+from app.api.receipt_deadline import protocol_with_deadline
+from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
+from app.cli.progress import bar
+from app.domain.records import problem_to_record
+from app.jobs import model
+from app.jobs.work_context import WorkContext
+from app.library.seeding import seed_library
+from app.logs import configure_logs
+from app.solvers.registry import parse_parameters
+from policy_store.backup import back_up
+from policy_store.errors import BackupFailed
+
+Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
+Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
+
+
+def serve(
+    host: Host = None,
+    port: Port = None,
+    data_dir: DataDir = None,
+    no_keys: Annotated[
+        bool | None,
+        typer.Option("--no-keys", help="Take requests without API keys from everybody.", show_default=False),
+    ] = None,
+) -> None:
+    """Start the service with everything that POST /allocate needs."""
+    settings = read_settings(host=host, port=port, data_dir=data_dir, no_keys=no_keys)
+    if settings.always_needs_keys:
+        with open_keys(settings) as store:
+            usable = any(key.revoked_at is None for key in store.all())
+        if not usable:
+            typer.echo(
+                f"others can reach {settings.host}, and there is no API key yet: make one with "
+                "`python -m app keys create`, or say --no-keys to serve everybody",
+                err=True,
+            )
+            raise typer.Exit(2)
+    configure_logs(settings.log_level)
+    uvicorn.run(
+        create_application(settings),
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        access_log=False,
+        http=protocol_with_deadline(settings.receive_timeout_s),
+        timeout_graceful_shutdown=int(settings.shutdown_grace_s),
+    )
+
+
+def allocate(
+    file: Annotated[Path, typer.Argument(help="A request of POST /allocate as JSON; - for standard input.")],
+    algorithm: Annotated[str | None, typer.Option(help="Instead of the request's.")] = None,
+    parameters: Annotated[str | None, typer.Option(help="JSON object, instead of the request's.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Instead of the request's.")] = None,
+    time_limit_s: Annotated[float | None, typer.Option(help="Instead of the request's.")] = None,
+    data_dir: DataDir = None,
+) -> None:
+    """Answer as POST /allocate does, without a server; the answer goes to standard output."""
+    started = time.monotonic()
+    settings = read_settings(data_dir=data_dir)
+    with refusals():
+        body = json.loads(sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8"))
+        given = {"algorithm": algorithm, "seed": seed, "time_limit_s": time_limit_s}
+        body |= {name: value for name, value in given.items() if value is not None}
+        if parameters is not None:
+            body["parameters"] = json.loads(parameters)
+        request = AllocationRequest.model_validate(body)
+        payload = {
+            "problem": problem_to_record(to_problem(request, settings)),
+            "algorithm": request.algorithm,
+            "parameters": parse_parameters(request.algorithm, request.parameters).model_dump(mode="json"),
+            "seed": request.seed,
+            "library_url": settings.resolved_database_url,
+            "threads": settings.threads_per_job,
+            "bound_time_limit_s": request.bound_seconds,
+        }
+        with open_library(settings) as (library, database):
+            seed_library(library, database)
+        # Loads compiled code and torch, which a call for help or a mistake need not wait for.
+        from app.jobs import work  # noqa: PLC0415 - slow to load
+
+        with bar(request.algorithm, total=1.0) as advance:
+
+            def report(progress: model.Progress) -> None:
+                advance(progress.fraction, f"best reward {progress.best_reward or 0:.4f}")
+
+            context = WorkContext.in_process(report, time_limit_s=request.time_limit_s)
+            result = work.allocate(payload, context).result
+    answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
+    sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
+
+
+def backup(
+    file: Annotated[Path, typer.Argument(help="Where to; it must not exist yet.")], data_dir: DataDir = None
+) -> None:
+    """Copy the database, also while the service runs, and check the copy.
+
+    To go back to it, stop the service and put the copy in the place of allocator.sqlite3; remove the files
+    allocator.sqlite3-wal and allocator.sqlite3-shm beside it.
+    """
+    url = make_url(read_settings(data_dir=data_dir).resolved_database_url)
+    if url.get_backend_name() != "sqlite":
+        typer.echo("this copies an SQLite file; a PostgreSQL database is copied by pg_dump", err=True)
+        raise typer.Exit(1)
+    source = url.database
+    try:
+        size = back_up(Path(str(source)), file)
+    except BackupFailed as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    typer.echo(f"{file}: {size} bytes", err=True)
