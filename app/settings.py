@@ -64,7 +64,8 @@ class Settings(BaseSettings):
         default=1,
         ge=1,
         le=256,
-        description="Cores that the search of one job keeps busy; workers times this: processors",
+        description="Cores that the search of one job keeps busy; workers times this: processors. "
+        "Under a time limit it also uses those of idle workers",
     )
     executor: Literal["local", "ray"] = Field(
         default="local", description="Where jobs run: `local`, on this machine, or `ray`, on a Ray cluster"

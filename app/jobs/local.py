@@ -30,7 +30,7 @@ from app.jobs.executor import Lost, Outcome, Raised
 from app.jobs.failure import describe
 from app.jobs.model import Progress
 from app.jobs.slots import SlotExecution, SlotExecutor
-from app.jobs.work_context import CANCEL, DEADLINE, new_control
+from app.jobs.work_context import CANCEL, DEADLINE, SHARE, new_control
 
 # The workers share the cores: one that starts threads of its own slows the others down, and itself.
 SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -70,6 +70,7 @@ class LocalExecutor(SlotExecutor["_Worker"]):
         log_level: str | None = None,
     ) -> None:
         super().__init__(slots)
+        self._working: set[_Worker] = set()
         self._warm_up = partial(worker.warm_up, warm_up, *warm_up_arguments)
         self._environment = dict(environment)
         self._log_level = log_level
@@ -85,7 +86,11 @@ class LocalExecutor(SlotExecutor["_Worker"]):
     ) -> _LocalExecution:
         """Hand work to the next free worker, see :meth:`app.jobs.executor.Executor.submit`."""
         execution = _LocalExecution(
-            self._free, partial(worker.run, dict(labels), work, payload), time_left_s, on_progress
+            self._free,
+            partial(worker.run, dict(labels), work, payload),
+            time_left_s,
+            on_progress,
+            self._working,
         )
         self._keep(execution)
         return execution
@@ -196,8 +201,10 @@ class _LocalExecution(SlotExecution[_Worker]):
         run: Callable[[int], worker.Ended],
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
+        working: set[_Worker],
     ) -> None:
         self._run_with = run
+        self._working = working
         self._deadline = math.inf if time_left_s is None else time.monotonic() + time_left_s
         self._on_progress = on_progress
         super().__init__(free)
@@ -222,6 +229,8 @@ class _LocalExecution(SlotExecution[_Worker]):
             except RuntimeError:
                 continue  # it died while it was idle: its slot brings another
             self._worker = slot
+            self._working.add(slot)
+            self._divide()
             try:
                 ended = await asyncio.wrap_future(future)
             except BrokenProcessPool:
@@ -235,8 +244,15 @@ class _LocalExecution(SlotExecution[_Worker]):
                 slot.end(ended.progress)
             finally:
                 self._worker = None
+                self._working.discard(slot)
             self._free.put_nowait(slot)
+            self._divide()
             return outcome
+
+    def _divide(self) -> None:
+        """Tell every worker that works how many workers' cores it may use: with its part of the idle ones."""
+        for each in self._working:
+            each.control[SHARE] = 1.0 + self._free.qsize() // len(self._working)
 
 
 @contextlib.contextmanager

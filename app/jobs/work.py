@@ -91,7 +91,9 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     limit = TimeLimit(context, _answer_time, problem, payload.get("bound_time_limit_s"))
     if limit.leaves_none_for(algorithm):
         return _at_once(problem, payload, limit, context)
-    solver = create_solver(algorithm, parse_parameters(algorithm, payload["parameters"]), _means(payload))
+    solver = create_solver(
+        algorithm, parse_parameters(algorithm, payload["parameters"]), _means(payload, context)
+    )
     solution = solver.solve(problem, seed, limit.searching, _report(context))
     limit.searched(algorithm)
     return _result(problem, solution, payload, limit)
@@ -120,15 +122,16 @@ def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResul
 
 def _at_once(problem: Problem, payload: dict[str, Any], limit: TimeLimit, context: WorkContext) -> WorkResult:
     """The greedy rule's plan, as far as it comes, in the name of the algorithm that was asked for."""
-    greedy = create_solver("greedy", parse_parameters("greedy", {}), _means(payload))
+    greedy = create_solver("greedy", parse_parameters("greedy", {}), _means(payload, context))
     solution = greedy.solve(problem, payload["seed"], limit.bounding, _report(context))
     asked = parse_parameters(payload["algorithm"], payload["parameters"])
     return _result(problem, replace(solution, parameters=asked), payload, limit)
 
 
-def _means(payload: dict[str, Any]) -> protocol.SolverContext:
+def _means(payload: dict[str, Any], context: WorkContext) -> protocol.SolverContext:
     # A job that was stored by an earlier version says nothing of threads.
-    return protocol.SolverContext(payload["library_url"], payload.get("threads", 1))
+    threads = payload.get("threads", 1)
+    return protocol.SolverContext(payload["library_url"], threads, lambda: threads * (context.share() - 1))
 
 
 def _result(

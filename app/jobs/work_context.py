@@ -8,12 +8,12 @@ from collections.abc import Callable, MutableSequence
 
 from app.jobs.model import Progress
 
-CANCEL, DEADLINE = 0, 1
+CANCEL, DEADLINE, SHARE = 0, 1, 2
 
 
 def new_control() -> list[float]:
-    """Return a control block that nobody else sees: not cancelled, no deadline."""
-    return [0.0, math.inf]
+    """Return a control block that nobody else sees: not cancelled, no deadline, the share of one worker."""
+    return [0.0, math.inf, 1.0]
 
 
 class WorkContext:
@@ -27,9 +27,10 @@ class WorkContext:
     report
         Called with every progress. It must be quick, the worker's own only takes a note.
     control
-        Two numbers that another process may change while the work runs: non-zero once the job is cancelled,
-        and the deadline on the monotonic clock, which all processes of a machine share (infinite for none).
-        Asking reads shared memory and takes well under a microsecond.
+        Three numbers that another process may change while the work runs: non-zero once the job is cancelled;
+        the deadline on the monotonic clock, which all processes of a machine share (infinite for none); and
+        how many workers' cores it may use, its own and those of workers that do nothing. Asking reads shared
+        memory and takes well under a microsecond.
     """
 
     def __init__(
@@ -57,6 +58,10 @@ class WorkContext:
     def cancelled(self) -> bool:
         """Say whether somebody asked the work to stop."""
         return self._control[CANCEL] != 0.0
+
+    def share(self) -> int:
+        """Return how many workers' cores the work may use now, at least 1."""
+        return int(self._control[SHARE])
 
     def time_left(self) -> float | None:
         """Return the seconds that are left, zero or less when time is up; None without a time limit."""

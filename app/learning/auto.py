@@ -79,7 +79,7 @@ class Auto:
                 _start_from_best(search, plans)
         history.add(0, float(search.best[0]))
         watch = watching(search, history, report, _STARTS_SHARE)
-        search_on(search, seed, self._context.threads, moves, restarts + 1, stop, watch)
+        search_on(search, seed, self._context, moves, restarts + 1, stop, watch)
         used = given.model_copy(update={"moves": moves, "restarts": restarts, "policy": policy})
         return Solution(Plan.of(actions_of(search), problem.n_targets), history, used, source)
 

@@ -22,6 +22,11 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+def none_spare() -> int:
+    """No core is idle."""
+    return 0
+
+
 @dataclass(frozen=True, slots=True)
 class SolverContext:
     """What a solver may use besides the problem.
@@ -32,10 +37,14 @@ class SolverContext:
         Database of the policy library, or None where there is none.
     threads
         Cores it may keep busy, at least 1.
+    spare_threads
+        Returns how many more it may keep busy at this moment, because nobody else does. What it finds then
+        depends on the moment, so it is for searches under a time limit, which do so anyway.
     """
 
     library_url: str | None = None
     threads: int = 1
+    spare_threads: Callable[[], int] = none_spare
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,17 @@ def until_file(payload: Payload, context: WorkContext) -> WorkResult:
     return WorkResult({"pid": os.getpid()})
 
 
+def share_until_file(payload: Payload, context: WorkContext) -> WorkResult:
+    """Report as the epoch how many workers' cores may be used, when it changes, until the file is there."""
+    told = 0
+    while not Path(payload["path"]).exists():
+        if context.share() != told:
+            told = context.share()
+            context.report(Progress(0.25, epoch=told))
+        time.sleep(0.002)
+    return WorkResult({})
+
+
 def until_stopped(payload: Payload, context: WorkContext) -> WorkResult:
     """Improve until it is told to stop."""
     best = 0

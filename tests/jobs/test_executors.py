@@ -161,6 +161,27 @@ def test_work_is_cancelled_wherever_it_is(new_executor):
     asyncio.run(scenario())
 
 
+def test_work_may_use_the_cores_of_workers_that_do_nothing(tmp_path):
+    async def scenario():
+        executor = LocalExecutor(3)
+        await executor.start(lambda: None)
+        try:
+            await eventually(lambda: executor.ready == 3)
+            first, told = submit(executor, "share_until_file", {"path": str(tmp_path / "first")})
+            await eventually(lambda: bool(told) and told[-1].epoch == 3)
+            second, told_too = submit(executor, "share_until_file", {"path": str(tmp_path / "second")})
+            await eventually(lambda: bool(told_too) and told[-1].epoch == told_too[-1].epoch == 1)
+            (tmp_path / "first").touch()
+            await first.outcome()
+            await eventually(lambda: told_too[-1].epoch == 3)
+            (tmp_path / "second").touch()
+            await second.outcome()
+        finally:
+            await executor.close()
+
+    asyncio.run(scenario())
+
+
 def test_a_dead_worker_loses_its_own_work_and_is_replaced(new_executor, tmp_path):
     async def scenario():
         async with started(new_executor) as executor:

@@ -3,7 +3,7 @@
 import pytest
 
 from app.jobs.model import Progress
-from app.jobs.work_context import CANCEL, DEADLINE, WorkContext, new_control
+from app.jobs.work_context import CANCEL, DEADLINE, SHARE, WorkContext, new_control
 
 
 def test_a_context_shows_its_control_block():
@@ -12,10 +12,13 @@ def test_a_context_shows_its_control_block():
     context = WorkContext(heard.append, control)
     assert not context.cancelled()
     assert context.time_left() is None
+    assert context.share() == 1
     control[CANCEL] = 1.0
     control[DEADLINE] = 0.0
     assert context.cancelled()
+    control[SHARE] = 3.0
     assert context.time_left() < 0
+    assert context.share() == 3
     context.report(Progress(0.5))
     assert heard == [Progress(0.5)]
 

@@ -274,6 +274,33 @@ def test_several_threads_give_the_same_plan_each_time_and_none_worse_than_its_st
     )
 
 
+def test_under_a_time_limit_it_searches_on_idle_cores_too_as_long_as_they_are(monkeypatch):
+    problem = generate("uniform", 6, 12, 2, np.random.default_rng(3))
+    searched, asked = set(), []
+
+    def spare():
+        asked.append(len(asked))
+        return 2 if len(asked) < 20 else 0
+
+    def note(search, *_given):
+        searched.add((id(search), len(asked) < 20))
+        anneal(search, *_given)
+
+    monkeypatch.setattr("app.solvers.local_search.improvement.anneal", note)
+    search = LocalSearch(LocalSearchParameters(), SolverContext(spare_threads=spare))
+    solution = search.solve(problem, 5, Deadline(0.5), quiet)
+    assert len({who for who, while_idle in searched if while_idle}) == 3
+    earned = replay(problem_to_record(problem), solution.plan.assignment)["reward"]
+    assert earned == pytest.approx(solution.history.reward[-1], abs=1e-9)
+    asked.clear()
+    searched.clear()
+    context = SolverContext(spare_threads=spare)
+    alone = LocalSearch(LocalSearchParameters(moves=4000), context).solve(problem, 5, never, quiet)
+    assert (len(searched), asked) == (1, [])
+    plain = LocalSearch(LocalSearchParameters(moves=4000), SolverContext()).solve(problem, 5, never, quiet)
+    assert alone.plan == plain.plan
+
+
 class Clock:
     """Time passes by being looked at."""
 

@@ -83,16 +83,16 @@ def improve(
     watch: Watch,
 ) -> None:
     """Anneal on one core; see :func:`improve_together`."""
-    improve_together([search], [rng], moves, rounds, cooling, stop, watch)
+    improve_together([search], [rng], [stop], moves, rounds, cooling, watch)
 
 
 def improve_together(
     searches: Sequence[Search],
     generators: Sequence[np.random.Generator],
+    stops: Sequence[StopCriterion],
     moves: int,
     rounds: int,
     cooling: Cooling,
-    stop: StopCriterion,
     watch: Watch,
 ) -> None:
     """Anneal from the searches' current plans, a thread each; after a round all go on from the best plan.
@@ -104,18 +104,19 @@ def improve_together(
         all rounds and of before.
     generators
         The only source of randomness, one a search.
+    stops
+        One a search, asked every few milliseconds. When the first one's says so, all is over; another's ends
+        its search until the next round. Unless the first has a time limit, it does not change what the moves
+        before it were.
     moves, rounds
         How many moves each search tries, over all rounds, at least 1. Where less time is left than they
         would take, there are fewer rounds in proportion.
     cooling
         Temperatures.
-    stop
-        Asked every few milliseconds. Unless it has a time limit, it does not change what the moves before it
-        were.
     watch
         Told now and then, and after each round.
     """
-    first = searches[0]
+    first, stop = searches[0], stops[0]
     begin, left = time.monotonic(), seconds_left(stop)
     if left is not None:
         possible = left * moves_a_second(first.arrays)
@@ -136,8 +137,8 @@ def improve_together(
                     watch((number + share) / rounds, number)
 
                 others = [
-                    threads.submit(_round, search, rng, span, cooling, stop, _silent)
-                    for search, rng in zip(searches[1:], generators[1:], strict=True)
+                    threads.submit(_round, search, rng, span, cooling, ends, _silent)
+                    for search, rng, ends in zip(searches[1:], generators[1:], stops[1:], strict=True)
                 ]
                 _round(first, generators[0], span, cooling, stop, tell)
                 for other in others:

@@ -21,7 +21,7 @@ class LocalSearch:
 
     def __init__(self, parameters: LocalSearchParameters, context: SolverContext) -> None:
         self.parameters = parameters
-        self._threads = context.threads
+        self._context = context
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the greedy rule's plan."""
@@ -31,7 +31,7 @@ class LocalSearch:
         set_routes(search, greedy_plan(problem).as_array())
         history.add(0, float(search.best[0]))
         watch = watching(search, history, report)
-        search_on(search, seed, self._threads, moves, restarts + 1, stop, watch)
+        search_on(search, seed, self._context, moves, restarts + 1, stop, watch)
         used = self.parameters.model_copy(update={"moves": moves, "restarts": restarts})
         return Solution(Plan.of(actions_of(search), problem.n_targets), history, used)
 
@@ -48,7 +48,7 @@ def how_long(
 def search_on(
     search: Search,
     seed: int,
-    threads: int,
+    context: SolverContext,
     moves: int,
     rounds: int,
     stop: StopCriterion,
@@ -56,12 +56,26 @@ def search_on(
 ) -> None:
     """Search from a current plan on some threads, each with the moves and a stream of random numbers.
 
-    The same seed and number of threads give the same plan as long as `stop` does not end it early.
+    The same seed and number of threads give the same plan as long as `stop` does not end it early. Under a
+    time limit there are more threads where cores are idle; they end when those are needed.
     """
-    streams = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(threads)
-    searches = [search, *(replica(search) for _ in range(threads - 1))]
+    spare = 0 if seconds_left(stop) is None else context.spare_threads()
+    stops = [stop] * context.threads + [_WhileSpare(stop, context, place) for place in range(1, spare + 1)]
+    streams = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(len(stops))
+    searches = [search, *(replica(search) for _ in stops[1:])]
     generators = [np.random.default_rng(stream) for stream in streams]
-    improve_together(searches, generators, moves, rounds, Cooling(), stop, watch)
+    improve_together(searches, generators, stops, moves, rounds, Cooling(), watch)
+
+
+class _WhileSpare:
+    """Stops when another criterion does, or once there are fewer spare threads than before this one's."""
+
+    def __init__(self, other: StopCriterion, context: SolverContext, place: int) -> None:
+        self._other, self._context, self._place = other, context, place
+
+    def __call__(self) -> bool:
+        """See :class:`~app.solvers.protocol.StopCriterion`."""
+        return self._context.spare_threads() < self._place or self._other()
 
 
 def watching(search: Search, history: History, report: Report, begin: float = 0.0) -> Watch:
