@@ -128,7 +128,7 @@ def encode(
         "metrics": dict(metrics),
         "version": app.__version__,
     }
-    return _pack(dict(network.state_dict()), metadata)
+    return _pack({name: tensor.cpu() for name, tensor in network.state_dict().items()}, metadata)
 
 
 def with_name(data: bytes, name: str) -> bytes:

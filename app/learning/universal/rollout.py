@@ -58,7 +58,7 @@ def play(
     Parameters
     ----------
     agent
-        The policy.
+        The policy, on any device.
     arrays, problem
         A stack of problems, and (B,) which of them to play.
     rng
@@ -69,14 +69,15 @@ def play(
         Asked before every turn; once it is true, everybody who is still out flies home.
     """
     m, n, _ = arrays.shape
+    device = agent.home.device
     batch, steps = len(problem), int(arrays.max_steps.max())
     episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
     look(arrays, episodes, outlook)
     plans = np.full((batch, steps, m), n, np.int64)
     rewards = np.zeros(batch)
-    scaled = torch.from_numpy((arrays.between / outlook.extent[:, None, None]).astype(np.float32))
-    bias = agent.bias(scaled)
-    hidden = torch.zeros(m, batch, agent.home.shape[0])
+    scaled = (arrays.between / outlook.extent[:, None, None]).astype(np.float32)
+    bias = agent.bias(torch.from_numpy(scaled).to(device))
+    hidden = torch.zeros(m, batch, agent.home.shape[0], device=device)
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
     rivals = np.empty((batch, n, m, RIVAL_FEATURES), np.float32)
@@ -90,22 +91,27 @@ def play(
             count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn, rewards)
             if not count:
                 continue
-            who = torch.from_numpy(turn[:count])
-            chosen = bias.expand(count, -1, -1, -1) if single else bias[episodes.problem[turn[:count]]]
-            rows = torch.from_numpy(pair[:count])
-            tokens = agent.encode(
-                rows, torch.from_numpy(own[:count]), torch.from_numpy(rivals[:count]), chosen
+            who, which, rows, mine, others = (
+                torch.from_numpy(column).to(device)
+                for column in (
+                    turn[:count],
+                    episodes.problem[turn[:count]],
+                    pair[:count],
+                    own[:count],
+                    rivals[:count],
+                )
             )
+            chosen = bias.expand(count, -1, -1, -1) if single else bias[which]
+            tokens = agent.encode(rows, mine, others, chosen)
             remembered = agent.remember(tokens, hidden[i, who])
             hidden[i, who] = remembered
             logits = agent.logits(agent.values(tokens, remembered))
             logits[:, :n].masked_fill_(rows[:, :, 0] == 0, -torch.inf)
             if rng is not None:
                 noise = rng.gumbel(size=logits.shape).astype(np.float32)
-                logits = logits / temperature + torch.from_numpy(noise)
-            _act_turn(
-                arrays, episodes, outlook, i, turn[:count], logits.argmax(dim=1).numpy(), plans[:, s], rewards
-            )
+                logits = logits / temperature + torch.from_numpy(noise).to(device)
+            actions = logits.argmax(dim=1).cpu().numpy()
+            _act_turn(arrays, episodes, outlook, i, turn[:count], actions, plans[:, s], rewards)
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
             break

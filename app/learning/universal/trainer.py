@@ -18,6 +18,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from app.learning.device import learning_device
 from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.demonstrations import Demonstrations, read_shard
 from app.learning.universal.learner import Batch, Learner, make_batch
@@ -97,7 +98,8 @@ def fit(
     Parameters
     ----------
     agent, mixer
-        As initialised; replaced by what `state` holds if that exists.
+        As initialised; replaced by what `state` holds if that exists. They learn on a GPU where there is one,
+        and are on the processor before and afterwards.
     shards
         Files of demonstrations.
     schedule
@@ -107,17 +109,20 @@ def fit(
     watch
         Told the number of updates done and running means of the losses.
     """
+    device = learning_device()
+    agent.to(device)
+    mixer.to(device)
     learner = Learner(agent, mixer, lr=schedule.lr, td_weight=schedule.td_weight, optimisers=muon)
     done = _resume(learner, state) if state.exists() else 0
     means: dict[str, float] = {}
     with ThreadPoolExecutor(1) as ahead:
-        following = ahead.submit(_demonstrated, shards, schedule.seed, done)
+        following = ahead.submit(_demonstrated, shards, schedule.seed, done, device)
         for update in range(done, schedule.updates):
             arrays, batch, whole = following.result()
             demonstrated = not whole or update % OWN_EVERY != OWN_EVERY - 1
-            following = ahead.submit(_demonstrated, shards, schedule.seed, update + 1)
+            following = ahead.submit(_demonstrated, shards, schedule.seed, update + 1, device)
             if not demonstrated:
-                batch = _own(agent, arrays, np.random.default_rng([schedule.seed, update, 1]))
+                batch = _own(agent, arrays, np.random.default_rng([schedule.seed, update, 1]), device)
             losses = learner.update(
                 batch,
                 schedule.share_of_lr(update),
@@ -129,6 +134,8 @@ def fit(
             if (update + 1) % SAVE_EVERY == 0 or update + 1 == schedule.updates:
                 _save(learner, update + 1, state)
             watch(update + 1, means)
+    agent.cpu()
+    mixer.cpu()
 
 
 def initial(config: UniversalConfig, seed: int) -> tuple[UniversalAgent, UniversalMixer]:
@@ -145,7 +152,9 @@ def _read(path: Path) -> Demonstrations:
     return read_shard(path)
 
 
-def _demonstrated(shards: list[Path], seed: int, update: int) -> tuple[ProblemArrays, Batch, bool]:
+def _demonstrated(
+    shards: list[Path], seed: int, update: int, device: torch.device
+) -> tuple[ProblemArrays, Batch, bool]:
     """Some demonstrations of a shard, and whether all turns are there; of large episodes it is some UAVs'."""
     rng = np.random.default_rng([seed, update, 0])
     shown = _read(shards[rng.integers(len(shards))])
@@ -159,7 +168,7 @@ def _demonstrated(shards: list[Path], seed: int, update: int) -> tuple[ProblemAr
     whole = share > MIN_SHARE
     if not whole:
         turns = of_uavs(turns, rng.permutation(m)[: max(1, round(share * m))])
-    return arrays, make_batch(arrays, turns, torch.device("cpu")), whole
+    return arrays, make_batch(arrays, turns, device), whole
 
 
 def _in_random_order(
@@ -176,10 +185,12 @@ def _in_random_order(
     return reorder(arrays, orders), reorder_plans(plans, orders)
 
 
-def _own(agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator) -> Batch:
+def _own(
+    agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator, device: torch.device
+) -> Batch:
     problems = np.arange(len(arrays.max_steps))
     played = play(agent, arrays, problems, rng)
-    return make_batch(arrays, unfold(arrays, problems, played.plans), torch.device("cpu"))
+    return make_batch(arrays, unfold(arrays, problems, played.plans), device)
 
 
 def _save(learner: Learner, done: int, path: Path) -> None:

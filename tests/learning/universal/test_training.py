@@ -151,10 +151,10 @@ def test_demonstrations_in_another_order_of_uavs_earn_the_same():
 
 def test_of_large_episodes_some_uavs_are_learned_from(monkeypatch, shards):
     monkeypatch.setattr(trainer, "TURN_TOKENS", 12)
-    _, batch, whole = trainer._demonstrated(shards, 0, 0)
+    _, batch, whole = trainer._demonstrated(shards, 0, 0, torch.device("cpu"))
     assert not whole
     assert len(batch.uav.unique()) == 1
     monkeypatch.setattr(trainer, "TURN_TOKENS", 20_000)
-    _, batch, whole = trainer._demonstrated(shards, 0, 0)
+    _, batch, whole = trainer._demonstrated(shards, 0, 0, torch.device("cpu"))
     assert whole
     assert len(batch.uav.unique()) == 3
