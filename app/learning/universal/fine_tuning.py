@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-import torch
 
 from app.domain.errors import ProblemTooLarge
+from app.learning.device import learning_device
 from app.learning.universal.effort import batch_of
 from app.learning.universal.learner import Learner, make_batch
 from app.learning.universal.policy import UniversalPolicy
@@ -18,6 +18,9 @@ from app.solvers.protocol import StopCriterion
 
 TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
+
+_TD_EVERY = 4
+"""Every so many epochs, from the first, the TD loss is learned too; it takes longer than all the rest."""
 
 MAX_BYTES = 2**30
 """Most memory that an update may take; workers share a machine."""
@@ -48,7 +51,7 @@ class FineTuning:
     Parameters
     ----------
     policy
-        Where it begins; not changed.
+        Where it begins; not changed. The copy learns on a GPU where there is one.
     arrays
         A stack of one problem.
     batch_size
@@ -69,8 +72,9 @@ class FineTuning:
         gamma: float,
         rng: np.random.Generator,
     ) -> None:
-        self.policy = copy.deepcopy(policy)
-        self._arrays, self._rng = arrays, rng
+        self._device = learning_device()
+        self.policy = copy.deepcopy(policy).to(self._device)
+        self._arrays, self._rng, self._epochs = arrays, rng, 0
         m, n, _ = arrays.shape
         tokens = m * int(arrays.max_steps[0]) * (n + 1)
         self._episodes = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
@@ -84,7 +88,7 @@ class FineTuning:
     def epoch(
         self, best: Integers, stop: StopCriterion, episodes: int | None = None, temperature: float = 1.0
     ) -> Integers:
-        """Play some episodes and learn from them and from the best plan; return the plans (B, S, M).
+        """Play some episodes, learn from the best plan and, now and then, from them; return them (B, S, M).
 
         Parameters
         ----------
@@ -99,8 +103,9 @@ class FineTuning:
         """
         problem = np.zeros(episodes or self._episodes, np.int64)
         plans = play(self.policy.agent, self._arrays, problem, self._rng, temperature, stop).plans
-        if not stop():
+        if self._epochs % _TD_EVERY == 0 and not stop():
             self._learn(plans, imitate=False)
+        self._epochs += 1
         if (best < self._arrays.shape[1]).any() and not stop():
             self._learn(best[None], imitate=True)
         return plans
@@ -109,5 +114,5 @@ class FineTuning:
         problem = np.zeros(len(plans), np.int64)
         turns = unfold(self._arrays, problem, plans)
         stacked = stack([self._arrays] * len(plans))
-        batch = make_batch(stacked, turns, torch.device("cpu"))
+        batch = make_batch(stacked, turns, self._device)
         self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate)

@@ -15,6 +15,7 @@ from app.learning.universal.architecture import HEADS, WIDEST, UniversalConfig
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.recombination import Recombination
 from app.learning.universal.rollout import play
 from app.learning.universal.temperature import Temperature
 from app.simulation.arrays import ProblemArrays, compile_problem
@@ -75,11 +76,12 @@ class UniversalScratch:
         self._best.consider(greedy_plan(self._problem).as_array()[None])
         self._evaluate(0)
         temperature = Temperature(self._arrays)
+        recombination = Recombination(self._arrays, self._best)
         while done < epochs and not self._stop():
             count = min(self._tuning.episodes, epochs - done)
             plans = self._tuning.epoch(self._best.actions, self._stop, count, temperature.value)
             temperature.follow(plans, self._best.reward)
-            self._best.consider(plans)
+            recombination.consider(plans, self._stop)
             done += count
             if (done - count) // every < done // every or done == epochs:
                 self._evaluate(done)

@@ -22,6 +22,7 @@ from app.learning.universal.effort import Effort, batch_of, effort
 from app.learning.universal.fine_tuning import FineTuning, require_memory
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
+from app.learning.universal.recombination import Recombination
 from app.learning.universal.rollout import play, play_in_orders
 from app.learning.universal.temperature import Temperature
 from app.learning.universal.turn_order import some_orders
@@ -35,9 +36,6 @@ FINE_TUNING_LR = 1e-4
 
 _TRIED_AT_SIGHT = 2
 """Policies of the shortlist that are tried where a greedy roll-out is all that is asked for."""
-
-_TEMPERATURE = 0.5
-"""Of sampled roll-outs: cooler than what the policy was trained for, since the best of few is what counts."""
 
 _SHARES = {"roll-out": 0.05, "samples": 0.35, "fine-tuning": 0.55, "polish": 1.0}
 """Share of the work that is done at the end of each part."""
@@ -82,6 +80,7 @@ class UniversalTransfer:
         self._effort = effort(self._arrays)
         self._used = fill_in(parameters, self._effort)
         self._best = BestPlan(self._arrays)
+        self._recombination = Recombination(self._arrays, self._best)
         self._history = History()
         root = np.random.SeedSequence([abs(seed), int(seed < 0)])
         streams = map(np.random.default_rng, root.spawn(4))
@@ -137,6 +136,8 @@ class UniversalTransfer:
             policy = cast(UniversalPolicy, source.network)
             plans = play_in_orders(policy.agent, self._arrays, orders, stop=self._stop)
             found.append((source, self._best.consider(plans)))
+            if not self._used.is_bare:
+                self._recombination.consider(plans, self._stop)
             if self._stop():
                 break
         return max(found, key=lambda each: each[1])
@@ -146,16 +147,11 @@ class UniversalTransfer:
         while done < samples and not self._stop():
             count = batch_of(self._arrays, samples - done)
             orders = self._orders[: max(1, min(count, len(self._orders)))]
+            repeats = -(-count // len(orders))
             plans = play_in_orders(
-                policy.agent,
-                self._arrays,
-                orders,
-                -(-count // len(orders)),
-                self._sampling,
-                _TEMPERATURE,
-                self._stop,
+                policy.agent, self._arrays, orders, repeats, self._sampling, stop=self._stop
             )[:count]
-            self._best.consider(plans)
+            self._recombination.consider(plans, self._stop)
             done += count
             self._tell("samples", done / samples)
 
@@ -177,7 +173,7 @@ class UniversalTransfer:
         while done < used.n_epochs and not self._stop():
             plans = tuning.epoch(best.actions, self._stop, temperature=temperature.value)
             temperature.follow(plans, best.reward)
-            best.consider(plans)
+            self._recombination.consider(plans, self._stop)
             done += 1
             if done % parameters.evaluate_per_epoch == 0 or done == used.n_epochs:
                 played = play(tuning.policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)

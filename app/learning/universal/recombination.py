@@ -1,0 +1,135 @@
+"""Putting the plans of several episodes together: every UAV may take the route it has in another of them.
+
+An episode's plan is seldom good everywhere: the UAVs that did well in one did not in another. So plans are
+gone through UAV by UAV; each takes that of its routes, out of all episodes, with which the whole plan earns
+most. No route is changed, but for visits that others have made useless, which are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from app.learning.universal.best_plan import BestPlan
+from app.simulation.arrays import Integers, ProblemArrays
+from app.simulation.explain import rewards_of
+from app.simulation.simulator import ALLOWED, Episodes, act, new_episodes, reset_one, verdict
+from app.solvers.protocol import StopCriterion
+
+_KEPT = 128
+"""Plans whose routes are kept, the best ones."""
+
+_WORK = 2.5e6
+"""Turns that are played for all plans together to go once through their UAVs; some hundredths of a second."""
+
+
+class Recombination:
+    """Keeps the routes of the plans it was shown.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    best
+        The best plan so far; changed where a better one is found.
+    """
+
+    def __init__(self, arrays: ProblemArrays, best: BestPlan) -> None:
+        m, n, _ = arrays.shape
+        self._arrays, self._best = arrays, best
+        self._plans: Integers = np.full((0, int(arrays.max_steps[0]), m), n, np.int64)
+        self._episodes = new_episodes(arrays, 1)
+
+    def consider(self, plans: Integers, stop: StopCriterion) -> None:
+        """Look at plans, and at what routes of theirs and of those before make of them and of the best one.
+
+        Where the problem is large not all of them are improved, but the best first.
+
+        Parameters
+        ----------
+        plans
+            (B, S, M); those that are not allowed are left out.
+        stop
+            Asked before each plan that is improved.
+        """
+        self._best.consider(plans)
+        plans = self._allowed(np.concatenate([self._best.actions[None], plans]))
+        self._plans = self._allowed(np.concatenate([self._plans, plans]))[:_KEPT]
+        routes, counts = _distinct_routes(self._plans)
+        turns = int(counts.sum()) * plans.shape[1] * plans.shape[2]
+        for plan in plans[: int(_WORK / max(turns, 1))]:
+            if stop():
+                break
+            _improve(self._arrays, self._episodes, plan, routes, counts)
+            self._best.consider(plan[None])
+
+    def _allowed(self, plans: Integers) -> Integers:
+        """Those of some plans that are allowed, each once, best first."""
+        plans = np.unique(plans, axis=0)
+        replayed = rewards_of(self._arrays, plans)
+        order = np.argsort(-replayed.reward, kind="stable")
+        return plans[order[replayed.rule[order] == ALLOWED]]
+
+
+def _distinct_routes(plans: Integers) -> tuple[Integers, Integers]:
+    """Routes (M, R, S) of every UAV, each once, and how many it has (M,)."""
+    found = [np.unique(plans[:, :, i], axis=0) for i in range(plans.shape[2])]
+    counts = np.array([len(each) for each in found])
+    routes = np.zeros((len(found), int(counts.max(initial=0)), plans.shape[1]), np.int64)
+    for i, each in enumerate(found):
+        routes[i, : len(each)] = each
+    return routes, counts
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _improve(
+    arrays: ProblemArrays, episodes: Episodes, plan: Integers, routes: Integers, counts: Integers
+) -> None:
+    """Replace routes of an allowed plan (S, M) as long as one of them makes it earn more."""
+    m = plan.shape[1]
+    tried = plan.T.copy()
+    played, best = np.empty_like(plan), np.empty_like(plan)
+    place = np.empty(m, np.int64)
+    reward = _play(arrays, episodes, tried, place, plan)
+    unchanged, i = 0, 0
+    while unchanged < m:
+        better = False
+        for r in range(counts[i]):
+            tried[i] = routes[i, r]
+            earned = _play(arrays, episodes, tried, place, played)
+            if earned > reward + 1e-12 * abs(reward):
+                reward, better = earned, True
+                best[:] = played
+        if better:
+            plan[:] = best
+            tried[:] = plan.T
+        else:
+            tried[i] = plan[:, i]
+        unchanged = 0 if better else unchanged + 1
+        i = (i + 1) % m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _play(
+    arrays: ProblemArrays, episodes: Episodes, routes: Integers, place: Integers, plan: Integers
+) -> float:
+    """Fly routes (M, S) without the visits that are not allowed; write the plan, and return its reward."""
+    m, steps = routes.shape
+    home = arrays.level.shape[1]
+    reset_one(arrays, episodes, 0)
+    place[:] = 0
+    earned = 0.0
+    for s in range(steps):
+        for i in range(m):
+            p = place[i]
+            while p < steps and routes[i, p] < home:
+                if verdict(arrays, episodes, 0, i, routes[i, p]) == ALLOWED:
+                    break
+                p += 1
+            action = routes[i, p] if p < steps else home
+            place[i] = p + 1
+            plan[s, i] = action
+            earned += act(arrays, episodes, 0, i, action)
+    for i in range(m):
+        earned += act(arrays, episodes, 0, i, home)
+    return earned
