@@ -56,8 +56,8 @@ GENERAL = "every family, every size"
 class UniversalTrainingParameters(Parameters):
     """What a training of policies for every size is made with."""
 
-    shards: int = Field(default=120, ge=1, description="Files of searched plans, up to 64 problems each")
-    updates: int = Field(default=3500, ge=1, description="Steps of the optimiser on them")
+    shards: int = Field(default=260, ge=1, description="Files of searched plans, up to 64 problems each")
+    updates: int = Field(default=2800, ge=1, description="Steps of the optimiser on them")
     lr: float = Field(default=1e-2, gt=0, description="Highest learning rate on them")
     family_shards: int = Field(default=4, ge=1, description="Files of plans of one family")
     family_updates: int = Field(default=150, ge=1, description="Steps of the optimiser on a family")
