@@ -27,7 +27,7 @@ from policy_store.library import PolicyLibrary
 from policy_store.policy import Policy
 from policy_store.similarity import squared_distances
 
-SHORTLIST = 4
+SHORTLIST = 5
 """Policies for every size that are tried on a problem."""
 
 _LOOKED_THROUGH = 4 * SHORTLIST

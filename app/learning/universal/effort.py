@@ -19,7 +19,7 @@ _MOST_WORK = 6e7
 _CHOOSING_WORK = 3e6
 """Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
 
-_POLICIES = 4
+_POLICIES = 5
 _ORDERS = 8
 
 _SAMPLING_WORK = 6e6
