@@ -19,6 +19,9 @@ from app.solvers.protocol import StopCriterion
 _KEPT = 128
 """Plans whose routes are kept, the best ones."""
 
+_PIECE = 2e5
+"""Turns that are played between two looks at the stop criterion, about; a few milliseconds."""
+
 _WORK = 2.5e6
 """Turns that are played for all plans together to go once through their UAVs; some hundredths of a second."""
 
@@ -50,7 +53,7 @@ class Recombination:
         plans
             (B, S, M); those that are not allowed are left out.
         stop
-            Asked before each plan that is improved.
+            Asked every few milliseconds.
         """
         self._best.consider(plans)
         plans = self._allowed(np.concatenate([self._best.actions[None], plans]))
@@ -60,7 +63,11 @@ class Recombination:
         for plan in plans[: int(_WORK / max(turns, 1))]:
             if stop():
                 break
-            _improve(self._arrays, self._episodes, plan, routes, counts)
+            uav, unchanged = 0, 0
+            while unchanged < len(counts) and not stop():
+                uav, unchanged = _improve(
+                    self._arrays, self._episodes, plan, routes, counts, uav, unchanged, _PIECE
+                )
             self._best.consider(plan[None])
 
     def _allowed(self, plans: Integers) -> Integers:
@@ -83,17 +90,29 @@ def _distinct_routes(plans: Integers) -> tuple[Integers, Integers]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _improve(
-    arrays: ProblemArrays, episodes: Episodes, plan: Integers, routes: Integers, counts: Integers
-) -> None:
-    """Replace routes of an allowed plan (S, M) as long as one of them makes it earn more."""
+    arrays: ProblemArrays,
+    episodes: Episodes,
+    plan: Integers,
+    routes: Integers,
+    counts: Integers,
+    i: int,
+    unchanged: int,
+    piece: float,
+) -> tuple[int, int]:
+    """Replace routes of an allowed plan (S, M) by those with which it earns more, from UAV `i` on.
+
+    Returns which UAV is next and for how many in a row no other route was better: for all, and it is done.
+    It ends after so many turns, too.
+    """
     m = plan.shape[1]
     tried = plan.T.copy()
     played, best = np.empty_like(plan), np.empty_like(plan)
     place = np.empty(m, np.int64)
     reward = _play(arrays, episodes, tried, place, plan)
-    unchanged, i = 0, 0
-    while unchanged < m:
+    turns = 0
+    while unchanged < m and turns < piece:
         better = False
+        turns += counts[i] * plan.size
         for r in range(counts[i]):
             tried[i] = routes[i, r]
             earned = _play(arrays, episodes, tried, place, played)
@@ -107,6 +126,7 @@ def _improve(
             tried[i] = plan[:, i]
         unchanged = 0 if better else unchanged + 1
         i = (i + 1) % m
+    return i, unchanged
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
