@@ -7,102 +7,45 @@ processor's cache. At 5 UAVs and 10 targets a forward and backward pass takes 1.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
-from numba import njit
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-Float32s = npt.NDArray[np.float32]
-Function = TypeVar("Function", bound=Callable[..., Any])
+from app.learning.kernels import Float32s, add, candidate, interpolate, kernel, sigmoid_of_sum
 
-# Contraction to fused multiply-adds, and no care for NaN, infinity or the sign of zero: without these the
-# loops are not vectorised. Nothing is reordered, so the same input gives the same output.
-_OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "error_model": "numpy",
-    "_nrt": False,
-    "fastmath": {"contract", "nnan", "ninf", "nsz"},
-}
-_kernel: Callable[[Function], Function] = njit(**_OPTIONS)
-
-_HALF, _ONE, _TWO = np.float32(0.5), np.float32(1.0), np.float32(2.0)
-_SATURATED = np.float32(9.0)
-_P0, _P1, _P2 = np.float32(135135.0), np.float32(17325.0), np.float32(378.0)
-_Q1, _Q2, _Q3 = np.float32(62370.0), np.float32(3150.0), np.float32(28.0)
-
-
-@_kernel
-def _tanh(x: Any) -> Any:
-    """Hyperbolic tangent to 3e-7: Lambert's continued fraction of x/2, then the double angle.
-
-    A rational function, because calls of the mathematical library are not vectorised.
-    """
-    x = _SATURATED if x > _SATURATED else x
-    x = -_SATURATED if x < -_SATURATED else x
-    y = _HALF * x
-    s = y * y
-    p = y * (_P0 + s * (_P1 + s * (_P2 + s)))
-    q = _P0 + s * (_Q1 + s * (_Q2 + s * _Q3))
-    return _TWO * p * q / (p * p + q * q)
-
+_ONE = np.float32(1.0)
 
 # One loop a function: the compiler vectorises a loop over a few arrays, and gives up on one over ten.
 
 
-@_kernel
-def _sigmoid_of_sum(a: Float32s, b: Float32s) -> None:
-    for c in range(a.shape[0]):
-        a[c] = _HALF * _tanh(_HALF * (a[c] + b[c])) + _HALF
-
-
-@_kernel
-def _add(out: Float32s, a: Float32s, b: Float32s) -> None:
-    for c in range(out.shape[0]):
-        out[c] = a[c] + b[c]
-
-
-@_kernel
+@kernel
 def _multiply(out: Float32s, a: Float32s, b: Float32s) -> None:
     for c in range(out.shape[0]):
         out[c] = a[c] * b[c]
 
 
-@_kernel
-def _candidate(n: Float32s, r: Float32s, recurrent: Float32s) -> None:
-    for c in range(n.shape[0]):
-        n[c] = _tanh(n[c] + r[c] * recurrent[c])
-
-
-@_kernel
-def _interpolate(out: Float32s, n: Float32s, z: Float32s, before: Float32s) -> None:
-    for c in range(out.shape[0]):
-        out[c] = n[c] + z[c] * (before[c] - n[c])
-
-
-@_kernel
+@kernel
 def _candidate_gradient(out: Float32s, d: Float32s, z: Float32s, n: Float32s) -> None:
     for c in range(out.shape[0]):
         out[c] = d[c] * (_ONE - z[c]) * (_ONE - n[c] * n[c])
 
 
-@_kernel
+@kernel
 def _update_gradient(out: Float32s, d: Float32s, before: Float32s, n: Float32s, z: Float32s) -> None:
     for c in range(out.shape[0]):
         out[c] = d[c] * (before[c] - n[c]) * z[c] * (_ONE - z[c])
 
 
-@_kernel
+@kernel
 def _reset_gradient(out: Float32s, dn: Float32s, recurrent: Float32s, r: Float32s) -> None:
     for c in range(out.shape[0]):
         out[c] = dn[c] * recurrent[c] * r[c] * (_ONE - r[c])
 
 
-@_kernel
+@kernel
 def _forward_step(
     gates: Float32s,
     products: Float32s,
@@ -128,13 +71,13 @@ def _forward_step(
     """
     rows, h = hidden.shape
     for i in range(rows):
-        _sigmoid_of_sum(gates[i, : 2 * h], products[i, : 2 * h])
-        _add(recurrent[i], products[i, 2 * h :], bias)
-        _candidate(gates[i, 2 * h :], gates[i, :h], recurrent[i])
-        _interpolate(hidden[i], gates[i, 2 * h :], gates[i, h : 2 * h], before[i])
+        sigmoid_of_sum(gates[i, : 2 * h], products[i, : 2 * h])
+        add(recurrent[i], products[i, 2 * h :], bias)
+        candidate(gates[i, 2 * h :], gates[i, :h], recurrent[i])
+        interpolate(hidden[i], gates[i, 2 * h :], gates[i, h : 2 * h], before[i])
 
 
-@_kernel
+@kernel
 def _backward_step(
     gradient: Float32s,
     carry: Float32s,
@@ -162,7 +105,7 @@ def _backward_step(
     for i in range(rows):
         r, z, n = gates[i, :h], gates[i, h : 2 * h], gates[i, 2 * h :]
         d, dn = carry[i], d_input[i, 2 * h :]
-        _add(d, d, gradient[i])
+        add(d, d, gradient[i])
         _candidate_gradient(dn, d, z, n)
         _update_gradient(d_input[i, h : 2 * h], d, before[i], n, z)
         _reset_gradient(d_input[i, :h], dn, recurrent[i], r)

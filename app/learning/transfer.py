@@ -77,7 +77,8 @@ class TransferQmix:
             else:
                 sources = [policies.asked_for(parameters.source, problem, config=config, any_size=True)]
             if isinstance(sources[0].network, UniversalPolicy):
-                return UniversalTransfer(problem, parameters, seed, stop, report).run(sources)
+                spare = self._context.spare_threads
+                return UniversalTransfer(problem, parameters, seed, stop, report, spare).run(sources)
             return _fine_tune_and_polish(problem, sources[0], parameters, seed, stop, report)
 
 

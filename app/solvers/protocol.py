@@ -38,8 +38,8 @@ class SolverContext:
     threads
         Cores it may keep busy, at least 1.
     spare_threads
-        Returns how many more it may keep busy at this moment, because nobody else does. What it finds then
-        depends on the moment, so it is for searches under a time limit, which do so anyway.
+        Returns how many more it may keep busy at this moment, because nobody else does. Where what it finds
+        depends on their number, that is for searches under a time limit, which depend on the moment anyway.
     """
 
     library_url: str | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,11 +52,14 @@ class Series:
         Tells their random numbers from those of other series.
     families
         Families of their problems.
+    search
+        Share of the moves of a full search that a plan is searched with.
     """
 
     name: str
     stream: tuple[int, ...] = ()
     families: tuple[str, ...] = tuple(FAMILIES)
+    search: float = 1.0
 
 
 def demonstrate(
@@ -126,8 +129,9 @@ def write_shard(
     path = folder / f"{series.name}-{seed}-{number:05}.npz"
     if not path.exists():
         rng = np.random.default_rng([seed, number, *series.stream])
-        shown = demonstrate(draw_shard(rng, series.families), rng, agent)
-        save_shard(path, shown)
+        shard = draw_shard(rng, series.families)
+        shard = replace(shard, moves=round(series.search * shard.moves))
+        save_shard(path, demonstrate(shard, rng, agent))
     return path
 
 

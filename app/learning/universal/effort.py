@@ -33,7 +33,7 @@ _TUNING_WORK = 3e5
 _EPOCHS = 2
 """Within two seconds the search brings more than further epochs; these leave a policy to register."""
 
-_POLISH_SHARE = 0.65
+_POLISH_SHARE = 0.4
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 

@@ -13,13 +13,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from app.learning.kernels import Float32s
 from app.learning.universal.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import ALLOWED, Episodes, compiled, leg_home, leg_to, verdict
-
-Float32s = npt.NDArray[np.float32]
 
 FOLLOW_UPS = 16
 """Near targets considered for the visit after the next."""

@@ -13,7 +13,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -67,6 +67,7 @@ class UniversalTrainingParameters(Parameters):
     layers: int = Field(default=2, ge=1, description="Attention layers")
     qmix_hidden_dim: int = Field(default=32, ge=1, description="Hidden units of the mixing network")
     metric_problems: int = Field(default=32, ge=1, description="Fresh problems a family to measure on")
+    search: float = Field(default=1.0, gt=0, le=1, description="Share of a full search's moves for each plan")
     seed: int = Field(default=123, ge=0, description="Source of all randomness")
 
     @property
@@ -82,7 +83,8 @@ class Production:
     Parameters
     ----------
     work
-        Folder of what the stages leave behind: demonstrations, and states of trainings.
+        Folder of what the stages leave behind: demonstrations, and states of trainings. One for each set of
+        parameters.
     parameters
         What to make.
     workers
@@ -113,7 +115,7 @@ class Production:
         self.work.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         p = self.parameters
-        searched = self._shards(SEARCHED, p.shards)
+        searched = self._shards(replace(SEARCHED, search=p.search), p.shards)
         general = self._fit("general", searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
         specialised = self._specialise(general)
         measured = self._measured()
@@ -221,7 +223,7 @@ def _specialise(work: Path, parameters: UniversalTrainingParameters, general: Pa
     torch.set_num_threads(1)
     p, state = parameters, work / f"family-{family}.safetensors"
     agent = UniversalPolicy.of_training(general, p.config).agent
-    series = Series(f"demonstrations-{family}", (2, *family.encode()), (family,))
+    series = Series(f"demonstrations-{family}", (2, *family.encode()), (family,), p.search)
     shards = [write_shard(work, series, p.seed, number, agent) for number in range(p.family_shards)]
     schedule = Schedule(p.family_updates, p.family_lr, p.td_weight, p.seed)
     _fit(general, shards, schedule, state, p.config)
@@ -235,5 +237,5 @@ def _write_measured(work: Path, parameters: UniversalTrainingParameters, family:
         m, n, _ = METRIC_SHAPE
         rng = np.random.default_rng([_FRESH, *family.encode()])
         problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(count)]
-        save_shard(path, demonstrate(Shard(m, n, problems, METRIC_MOVES), rng))
+        save_shard(path, demonstrate(Shard(m, n, problems, round(parameters.search * METRIC_MOVES)), rng))
     return path

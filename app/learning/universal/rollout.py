@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import torch
 from numba import njit
 
+from app.learning.kernels import Float32s
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
+from app.learning.universal.inference import ask_together, attention_bias, compile_agent
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.observation import (
     FORBIDDEN,
-    Float32s,
     Outlook,
     look,
     look_again,
@@ -22,7 +23,7 @@ from app.learning.universal.observation import (
 from app.learning.universal.turn_order import reorder, restore_plans
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
-from app.solvers.protocol import StopCriterion
+from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never
 
 
@@ -41,7 +42,6 @@ class Played(NamedTuple):
     rewards: Floats
 
 
-@torch.inference_mode()
 def play(
     agent: UniversalAgent,
     arrays: ProblemArrays,
@@ -49,6 +49,7 @@ def play(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
+    spare: Callable[[], int] = none_spare,
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
 
@@ -58,7 +59,7 @@ def play(
     Parameters
     ----------
     agent
-        The policy, on any device.
+        The policy, on any device; it is asked on the processor.
     arrays, problem
         A stack of problems, and (B,) which of them to play.
     rng
@@ -67,22 +68,23 @@ def play(
         Of the sampling; less is greedier.
     stop
         Asked before every turn; once it is true, everybody who is still out flies home.
+    spare
+        Asked at every turn how many threads more it may use then.
     """
     m, n, _ = arrays.shape
-    device = agent.home.device
     batch, steps = len(problem), int(arrays.max_steps.max())
     episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
     look(arrays, episodes, outlook)
     plans = np.full((batch, steps, m), n, np.int64)
     rewards = np.zeros(batch)
-    scaled = (arrays.between / outlook.extent[:, None, None]).astype(np.float32)
-    bias = agent.bias(torch.from_numpy(scaled).to(device))
-    hidden = torch.zeros(m, batch, agent.home.shape[0], device=device)
+    compiled, sharpness = compile_agent(agent), float(agent.sharpness.detach().exp())
+    bias = attention_bias(agent, (arrays.between / outlook.extent[:, None, None]).astype(np.float32))
+    hidden = np.zeros((m, batch, len(compiled.home)), np.float32)
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
     rivals = np.empty((batch, n, m, RIVAL_FEATURES), np.float32)
     turn = np.empty(batch, np.int64)
-    single = len(bias) == 1
+    branch, branches = problem.copy(), len(bias)
     for s in range(steps):
         for i in range(m):
             if stop():
@@ -91,27 +93,33 @@ def play(
             count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn, rewards)
             if not count:
                 continue
-            who, which, rows, mine, others = (
-                torch.from_numpy(column).to(device)
-                for column in (
-                    turn[:count],
-                    episodes.problem[turn[:count]],
-                    pair[:count],
-                    own[:count],
-                    rivals[:count],
-                )
+            who = turn[:count]
+            # Sampled episodes begin alike: those that are still the same are asked about once.
+            _, first, place = np.unique(branch[who], return_index=True, return_inverse=True)
+            once = who[first]
+            remembered = hidden[i, once]
+            values = np.empty((len(first), n + 1), np.float32)
+            ask_together(
+                compiled,
+                pair[first],
+                own[first],
+                rivals[first],
+                bias,
+                episodes.problem[once],
+                remembered,
+                values,
+                spare(),
             )
-            chosen = bias.expand(count, -1, -1, -1) if single else bias[which]
-            tokens = agent.encode(rows, mine, others, chosen)
-            remembered = agent.remember(tokens, hidden[i, who])
-            hidden[i, who] = remembered
-            logits = agent.logits(agent.values(tokens, remembered))
-            logits[:, :n].masked_fill_(rows[:, :, 0] == 0, -torch.inf)
+            hidden[i, who] = remembered[place]
+            logits = values[place] * sharpness
+            logits[:, :n][pair[:count, :, 0] == 0] = -np.inf
             if rng is not None:
-                noise = rng.gumbel(size=logits.shape).astype(np.float32)
-                logits = logits / temperature + torch.from_numpy(noise).to(device)
-            actions = logits.argmax(dim=1).cpu().numpy()
-            _act_turn(arrays, episodes, outlook, i, turn[:count], actions, plans[:, s], rewards)
+                logits = logits / temperature + rng.gumbel(size=logits.shape)
+            actions = logits.argmax(axis=1)
+            _, which = np.unique(place * (n + 1) + actions, return_inverse=True)
+            branch[who] = branches + which
+            branches += count
+            _act_turn(arrays, episodes, outlook, i, who, actions, plans[:, s], rewards)
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
             break
@@ -126,6 +134,7 @@ def play_in_orders(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
+    spare: Callable[[], int] = none_spare,
 ) -> Integers:
     """Play one problem with its UAVs taking turns in several orders; return plans (Q * repeats, S, M).
 
@@ -134,7 +143,7 @@ def play_in_orders(
 
     Parameters
     ----------
-    agent, rng, temperature, stop
+    agent, rng, temperature, stop, spare
         As :func:`play` has them.
     arrays
         A stack of one problem.
@@ -148,7 +157,7 @@ def play_in_orders(
         **{name: np.repeat(column, count, axis=0) for name, column in arrays._asdict().items()}
     )
     episodes = np.repeat(np.arange(count), repeats)
-    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop)
+    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop, spare)
     return restore_plans(played.plans, orders[episodes])
 
 

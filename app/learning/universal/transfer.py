@@ -7,7 +7,7 @@ the order in which UAVs act does change what it does, so that is what is tried.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -20,16 +20,17 @@ from app.learning.source_policies import Source
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.effort import Effort, batch_of, effort
 from app.learning.universal.fine_tuning import FineTuning, require_memory
+from app.learning.universal.lanes import in_lanes
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
 from app.learning.universal.recombination import Recombination
 from app.learning.universal.rollout import play, play_in_orders
 from app.learning.universal.temperature import Temperature
 from app.learning.universal.turn_order import some_orders
-from app.simulation.arrays import compile_problem
+from app.simulation.arrays import Integers, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
-from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
+from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, none_spare
 
 FINE_TUNING_LR = 1e-4
 """Learning rate of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
@@ -65,6 +66,8 @@ class UniversalTransfer:
         As :class:`~app.solvers.protocol.Solver` has them.
     parameters
         Of service mode.
+    spare
+        How many threads more its roll-outs may use at this moment; they are the same with any number.
     """
 
     def __init__(
@@ -74,7 +77,9 @@ class UniversalTransfer:
         seed: int,
         stop: StopCriterion,
         report: Report,
+        spare: Callable[[], int] = none_spare,
     ) -> None:
+        self._spare = spare
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
         self._arrays = compile_problem(problem)
         self._effort = effort(self._arrays)
@@ -132,9 +137,15 @@ class UniversalTransfer:
         if self._used.is_bare:
             # As many roll-outs as of one policy in all orders, which earn no more.
             tried, orders = tried[:_TRIED_AT_SIGHT], orders[: -(-len(orders) // _TRIED_AT_SIGHT)]
-        for source in tried:
+
+        def play_from(source: Source) -> Integers:
             policy = cast(UniversalPolicy, source.network)
-            plans = play_in_orders(policy.agent, self._arrays, orders, stop=self._stop)
+            return play_in_orders(policy.agent, self._arrays, orders, stop=self._stop, spare=within)
+
+        # Where policies are played side by side, there is no core left for the turns of one of them.
+        spare = self._spare()
+        within = self._spare if len(tried) == 1 else none_spare
+        for source, plans in zip(tried, in_lanes(play_from, tried, spare), strict=False):
             found.append((source, self._best.consider(plans)))
             if not self._used.is_bare:
                 self._recombination.consider(plans, self._stop)
@@ -149,7 +160,13 @@ class UniversalTransfer:
             orders = self._orders[: max(1, min(count, len(self._orders)))]
             repeats = -(-count // len(orders))
             plans = play_in_orders(
-                policy.agent, self._arrays, orders, repeats, self._sampling, stop=self._stop
+                policy.agent,
+                self._arrays,
+                orders,
+                repeats,
+                self._sampling,
+                stop=self._stop,
+                spare=self._spare,
             )[:count]
             self._recombination.consider(plans, self._stop)
             done += count

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from app.learning.kernels import Float32s
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.observation import (
-    Float32s,
     Outlook,
     look,
     look_again,
