@@ -30,7 +30,7 @@ RUN useradd --create-home --uid 1000 allocator \
     && chown allocator /data /srv/numba-cache
 USER allocator
 WORKDIR /data
-RUN python -c "from app.jobs.work import warm_up; warm_up()"
+RUN python -m app compile
 
 VOLUME /data
 EXPOSE 8000

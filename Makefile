@@ -3,10 +3,12 @@ PORT ?= 8000
 HOST ?= 127.0.0.1
 PYTHON ?= python3
 BIN := .venv/bin
+# Test files at a time.
+PROCESSES ?= 2
 
 .PHONY: run test lint types borders unit bench constraints clean
 
-run: .venv/installed
+run: .venv/compiled
 	$(BIN)/python -m app serve --host $(HOST) --port $(PORT)
 
 test: lint types borders unit
@@ -21,8 +23,8 @@ types: .venv/installed
 borders: .venv/installed
 	$(BIN)/lint-imports
 
-unit: .venv/installed
-	$(BIN)/python -m pytest
+unit: .venv/compiled
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_simulator.py
@@ -46,6 +48,11 @@ constraints:
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	touch $@
+
+# One process compiles, so that several workers that start at once do not all do it.
+.venv/compiled: .venv/installed $(shell find app -name '*.py')
+	$(BIN)/python -m app compile
 	touch $@
 
 clean:

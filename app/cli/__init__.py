@@ -6,7 +6,7 @@ import typer
 
 from app.cli.keys import create_key, list_keys, revoke_key
 from app.cli.reproduction import reproduce
-from app.cli.service import allocate, backup, serve
+from app.cli.service import allocate, backup, compile_code, serve
 from app.cli.training import export, train, train_universal
 
 application = typer.Typer(
@@ -14,6 +14,7 @@ application = typer.Typer(
 )
 for command in (serve, allocate, train, train_universal, reproduce, export, backup):
     application.command()(command)
+application.command("compile")(compile_code)
 
 keys = typer.Typer(help="API keys: make, list, revoke.", no_args_is_help=True)
 keys.command("create")(create_key)

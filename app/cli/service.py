@@ -107,6 +107,15 @@ def allocate(
     sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
 
 
+def compile_code() -> None:
+    """Make and keep the compiled code that the service's workers load; takes minutes the first time."""
+    from app.jobs import work  # noqa: PLC0415 - slow to load
+
+    started = time.monotonic()
+    work.warm_up()
+    typer.echo(f"compiled code is ready ({time.monotonic() - started:.0f} s)", err=True)
+
+
 def backup(
     file: Annotated[Path, typer.Argument(help="Where to; it must not exist yet.")], data_dir: DataDir = None
 ) -> None:

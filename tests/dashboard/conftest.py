@@ -28,8 +28,6 @@ PATIENCE_MS = 20_000
 
 def pytest_collection_modifyitems(items):
     here = Path(__file__).parent
-    # Playwright keeps an event loop running in the main thread, where other tests run loops of their own.
-    items.sort(key=lambda item: here in item.path.parents)
     if Path(CHROMIUM).exists() or os.environ.get("REQUIRE_BROWSER") == "1":
         return
     for item in items:
@@ -59,7 +57,9 @@ def service(tmp_path_factory) -> Iterator[LiveService]:
         running.stop()
 
 
-@pytest.fixture(scope="session")
+# Not for the session: Playwright keeps an event loop running in the main thread, where tests of other folders
+# that come next in the same process run loops of their own.
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     with browsing() as started:
         yield started

@@ -29,6 +29,7 @@ TINY = UniversalTrainingParameters(
     width=8,
     layers=1,
     metric_problems=1,
+    search=0.01,
 )
 HOW_TO_GET_IT = "no Ray: pip install '.[ray]' (REQUIRE_RAY=1 makes this a failure)"
 

@@ -14,6 +14,7 @@ PARAMETERS = UniversalTrainingParameters(
     width=8,
     layers=1,
     metric_problems=1,
+    search=0.01,
 )
 
 
