@@ -25,7 +25,7 @@ BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DO
 SHELL = [text for language, text in BLOCKS if language == "sh" and text.strip() != "make run"]
 PYTHON = [text for language, text in BLOCKS if language == "python"]
 ANSWERS = [text for language, text in BLOCKS if language == "json"]
-START_S = 180.0
+START_S = 300.0
 COMMAND_S = 120.0
 
 

@@ -77,9 +77,13 @@ class TransferQmix:
             else:
                 sources = [policies.asked_for(parameters.source, problem, config=config, any_size=True)]
             if isinstance(sources[0].network, UniversalPolicy):
-                spare = self._context.spare_threads
-                return UniversalTransfer(problem, parameters, seed, stop, report, spare).run(sources)
+                transfer = UniversalTransfer(problem, parameters, seed, stop, report, self._other_threads)
+                return transfer.run(sources)
             return _fine_tune_and_polish(problem, sources[0], parameters, seed, stop, report)
+
+    def _other_threads(self) -> int:
+        """How many threads may work beside this one now."""
+        return self._context.threads - 1 + self._context.spare_threads()
 
 
 def _fine_tune(

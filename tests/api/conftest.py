@@ -25,7 +25,7 @@ LIMITS = {
     "job_grace_s": 5.0,
     "shutdown_grace_s": 0.2,
 }
-READY_WITHIN_S = 120
+READY_WITHIN_S = 300
 
 
 class Service:

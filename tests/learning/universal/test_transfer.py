@@ -164,6 +164,17 @@ def test_same_seed_same_answer(store):
     assert first.checkpoint != other.checkpoint
 
 
+@pytest.mark.parametrize("given", [BARE, SOME])
+def test_idle_cores_change_nothing_but_the_time(store, given):
+    problem = generate("uniform", 9, 24, 2, np.random.default_rng(31))
+    parameters = TransferQmixParameters(**given)
+    alone, together = (
+        TransferQmix(parameters, context).solve(problem, 1, never, lambda _progress: None)
+        for context in (SolverContext(store), SolverContext(store, threads=2, spare_threads=lambda: 2))
+    )
+    assert together == alone
+
+
 def test_fine_tuned_policies_are_checkpoints_and_sources(store, policies, tmp_path):
     problem = generate("uniform", 5, 8, 2, np.random.default_rng(27))
     solution = solve(store, problem, source="uniform", **SOME)
