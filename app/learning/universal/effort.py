@@ -20,7 +20,7 @@ _CHOOSING_WORK = 3e6
 """Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
 
 _POLICIES = 5
-_ORDERS = 8
+_ORDERS = 6
 
 _SAMPLING_WORK = 6e6
 """Work of all sampled roll-outs together; about a third of a second."""
@@ -33,7 +33,7 @@ _TUNING_WORK = 3e5
 _EPOCHS = 2
 """Within two seconds the search brings more than further epochs; these leave a policy to register."""
 
-_POLISH_SHARE = 0.4
+_POLISH_SHARE = 0.25
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 
