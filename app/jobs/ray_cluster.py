@@ -247,12 +247,10 @@ class _RayExecution(SlotExecution[_Worker]):
         while slot.gone:
             slot = await self._free.get()
         self._worker = slot
-        if self._cancelled:
-            slot.cancel(self._serial)
         left = None if self._deadline is None else self._deadline - time.monotonic()
         listening = asyncio.create_task(self._listen(slot))
         try:
-            ended = await slot.run(self._serial, *self._call, left)
+            ended = await slot.run(self._serial, *self._call, left, self._cancelled)
         except Exception as error:
             # What was to be sent, or what came, cannot be pickled; the worker is well.
             ended = Ended(Raised(describe(error), traceback.format_exc()), None)

@@ -60,6 +60,7 @@ class RayWorker:
         work: str,
         payload: dict[str, Any],
         time_left_s: float | None,
+        cancelled: bool,
     ) -> Ended:
         """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
 
@@ -73,13 +74,15 @@ class RayWorker:
             ``"module:function"`` and what it gets.
         time_left_s
             Counted from now, so that the clocks of machines need not agree.
+        cancelled
+            Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
         control = new_control()
         if time_left_s is not None:
             control[DEADLINE] = time.monotonic() + time_left_s
         with self._changed:
             self._serial, self._control, self._latest, self._count = serial, control, None, 0
-            control[CANCEL] = float(self._cancelled == serial)
+            control[CANCEL] = float(cancelled or self._cancelled == serial)
 
         def report(progress: Progress) -> None:
             with self._changed:
@@ -118,7 +121,7 @@ class RayWorker:
             return self._count, clean(self._latest)
 
     def cancel(self, serial: int) -> None:
-        """Ask the work to stop; also if it has not begun yet."""
+        """Ask the work to stop; also if it has been sent and not begun."""
         with self._changed:
             self._cancelled = serial
             if self._serial == serial:

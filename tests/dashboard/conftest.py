@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from live_service import LiveService
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = (
@@ -23,7 +23,9 @@ HOW_TO_GET_ONE = (
     f"no Chromium at {CHROMIUM}: 'apt-get install chromium', or its path in the variable CHROMIUM "
     "(REQUIRE_BROWSER=1 makes this a failure)"
 )
-PATIENCE_MS = 20_000
+PATIENCE_MS = 60_000
+"""Only a failure waits as long; a machine with other work may need a part of it."""
+expect.set_options(timeout=PATIENCE_MS)
 
 
 def pytest_collection_modifyitems(items):

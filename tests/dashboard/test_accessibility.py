@@ -22,7 +22,7 @@ def audited(browser, service):
     context = browser.new_context(
         viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
     )
-    context.set_default_timeout(20_000)
+    context.set_default_timeout(60_000)
     page = context.new_page()
     page.goto(service.url)
     ready(page)

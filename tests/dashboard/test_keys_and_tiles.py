@@ -73,7 +73,7 @@ def visit(browser, guarded):
 
     def opened():
         context = browser.new_context(viewport={"width": 1366, "height": 900})
-        context.set_default_timeout(20_000)
+        context.set_default_timeout(60_000)
         contexts.append(context)
         page = context.new_page()
         page.said, page.asked = [], []
@@ -205,12 +205,12 @@ def test_a_job_is_followed_over_a_restart_of_the_service(visit, guarded):
     page.locator("#parameters").evaluate("details => { details.open = true; }")
     page.fill("#parameters input[name=iteration]", "1000000")
     page.click("#start")
-    expect(page.locator("#job-status")).to_have_text("running", timeout=20_000)
+    expect(page.locator("#job-status")).to_have_text("running")
     page.wait_for_selector("path.route")
     guarded.kill_all()
-    expect(page.locator("#job-status")).to_have_text("reconnecting", timeout=20_000)
+    expect(page.locator("#job-status")).to_have_text("reconnecting")
     guarded.start().await_ready()
-    expect(page.locator("#job-status")).to_have_text("running", timeout=60_000)
+    expect(page.locator("#job-status")).to_have_text("running")
     page.click("#cancel")
-    page.wait_for_selector("#figures", timeout=60_000)
+    page.wait_for_selector("#figures")
     assert not [text for text in page.said if "Uncaught" in text]

@@ -39,7 +39,7 @@ def test_every_row_can_be_reached_and_changed_and_few_are_there(large):
 
     page.locator("#dock").evaluate("(dock) => dock.scrollTo(0, dock.scrollHeight)")
     last = page.locator(f"table[data-kind=targets] tr[data-id=area-{N_TARGETS}]")
-    expect(last).to_be_visible(timeout=60_000)
+    expect(last).to_be_visible()
     assert last.get_attribute("aria-rowindex") == str(N_TARGETS + 1)
     cell = last.locator("td[data-column=level]")
     cell.click()
@@ -52,7 +52,7 @@ def test_every_row_can_be_reached_and_changed_and_few_are_there(large):
     page.evaluate(
         "async () => (await import('/dashboard/js/state.js')).select({ kind: 'targets', id: 'area-700' })"
     )
-    expect(page.locator("table[data-kind=targets] tr[data-id=area-700]")).to_be_in_viewport(timeout=60_000)
+    expect(page.locator("table[data-kind=targets] tr[data-id=area-700]")).to_be_in_viewport()
 
 
 def test_its_answer_is_shown_in_portions_and_the_selected_is_always_there(large, service):
