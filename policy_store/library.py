@@ -29,6 +29,7 @@ from policy_store.errors import (
     PolicyNotFound,
 )
 from policy_store.policy import Neighbour, NewPolicy, Policy, PolicyPage, Vector, as_vector
+from policy_store.policy_cache import PolicyCache
 from policy_store.tables import checkpoints, feature_vectors, library_revision, policies
 from policy_store.vector_cache import VectorCache, vector_from_bytes, vector_to_bytes
 
@@ -57,7 +58,7 @@ class PolicyLibrary:
     def __init__(self, database: Database, limits: ContainerLimits = _DEFAULT_LIMITS) -> None:
         self._database = database
         self._limits = limits
-        self._vectors = VectorCache()
+        self._vectors, self._nearest = VectorCache(), PolicyCache()
 
     def migrate(self) -> None:
         """Make the tables, or bring them to this version; nothing happens if they are.
@@ -265,11 +266,8 @@ class PolicyLibrary:
                 ids, matrix = tuple(ids[index] for index in chosen), matrix[chosen]
             indices, distances = similarity.nearest(matrix, query, k)
             near = [ids[index] for index in indices]
-            found = _get_many(connection, near)
-        return [
-            Neighbour(found[policy_id], float(distance))
-            for policy_id, distance in zip(near, distances, strict=True)
-        ]
+            found = self._nearest.get(known.revision, near, lambda ids: _get_many(connection, ids))
+        return [Neighbour(*pair) for pair in zip(found, distances.tolist(), strict=True)]
 
     def sizes(self, architecture: str | None = None) -> list[tuple[int, int, int]]:
         """List the sizes (M, N, K) of the source tasks there are, each once, in ascending order.
