@@ -33,6 +33,12 @@ _TUNING_WORK = 3e5
 _EPOCHS = 2
 """Within two seconds the search brings more than further epochs; these leave a policy to register."""
 
+_EPISODES = 64
+"""Episodes that an epoch of fine-tuning plays."""
+
+_EPOCH_WORK = 1e6
+"""Work of these together; about as long as learning takes."""
+
 _POLISH_SHARE = 0.25
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
@@ -79,6 +85,12 @@ def roll_out_work(arrays: ProblemArrays) -> float:
     """Weigh a greedy roll-out: 20 million take about a second."""
     m, n, _ = arrays.shape
     return float(m * int(arrays.max_steps[0]) * n * (m + 0.25 * n + 50))
+
+
+def episodes_of(arrays: ProblemArrays, learned: int) -> int:
+    """Return how many episodes an epoch plays that learns from so many of them."""
+    most = int(min(_EPISODES, _EPOCH_WORK / roll_out_work(arrays)))
+    return batch_of(arrays, max(learned, most))
 
 
 def batch_of(arrays: ProblemArrays, most: int) -> int:

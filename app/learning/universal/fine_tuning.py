@@ -8,7 +8,7 @@ import numpy as np
 
 from app.domain.errors import ProblemTooLarge
 from app.learning.device import learning_device
-from app.learning.universal.effort import batch_of
+from app.learning.universal.effort import batch_of, episodes_of
 from app.learning.universal.learner import Learner, make_batch
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.rollout import play
@@ -21,6 +21,10 @@ TURN_TOKENS = 4000
 
 _TD_EVERY = 4
 """Every so many epochs, from the first, the TD loss is learned too; it takes longer than all the rest."""
+
+_EPSILON = 0.2
+"""Chance that a turn of every other episode is any that is allowed: where a policy has become sure, no
+bearable temperature makes it try something else, and recombination lives on routes that are new."""
 
 MAX_BYTES = 2**30
 """Most memory that an update may take; workers share a machine."""
@@ -55,7 +59,7 @@ class FineTuning:
     arrays
         A stack of one problem.
     batch_size
-        Episodes an epoch at most; fewer where they are long.
+        Episodes an epoch learns from at most; fewer where they are long.
     lr, gamma
         Learning rate of Adam, discount.
     rng
@@ -77,13 +81,14 @@ class FineTuning:
         self._arrays, self._rng, self._epochs = arrays, rng, 0
         m, n, _ = arrays.shape
         tokens = m * int(arrays.max_steps[0]) * (n + 1)
-        self._episodes = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
+        self._learned = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
+        self._played = episodes_of(arrays, self._learned)
         self._learner = Learner(self.policy.agent, self.policy.mixer, lr=lr, td_weight=0.2, gamma=gamma)
 
     @property
-    def episodes(self) -> int:
-        """Episodes an epoch plays."""
-        return self._episodes
+    def learned(self) -> int:
+        """Episodes an epoch learns from at most; it may play more, for their routes."""
+        return self._learned
 
     def epoch(
         self, best: Integers, stop: StopCriterion, episodes: int | None = None, temperature: float = 1.0
@@ -97,14 +102,17 @@ class FineTuning:
         stop
             Once it is true nothing more is learned.
         episodes
-            How many, at most :attr:`episodes`, which it is where None.
+            How many; where None as many more than :attr:`learned` as are quickly played.
         temperature
             At which their actions are drawn.
         """
-        problem = np.zeros(episodes or self._episodes, np.int64)
-        plans = play(self.policy.agent, self._arrays, problem, self._rng, temperature, stop).plans
+        problem = np.zeros(episodes or self._played, np.int64)
+        epsilon = np.where(np.arange(len(problem)) % 2, _EPSILON, 0.0)
+        plans = play(
+            self.policy.agent, self._arrays, problem, self._rng, temperature, stop, epsilon=epsilon
+        ).plans
         if self._epochs % _TD_EVERY == 0 and not stop():
-            self._learn(plans, imitate=False)
+            self._learn(plans[: self._learned], imitate=False)
         self._epochs += 1
         if (best < self._arrays.shape[1]).any() and not stop():
             self._learn(best[None], imitate=True)

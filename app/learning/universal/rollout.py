@@ -50,6 +50,7 @@ def play(
     temperature: float = 1.0,
     stop: StopCriterion = never,
     spare: Callable[[], int] = none_spare,
+    epsilon: Floats | None = None,
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
 
@@ -70,6 +71,9 @@ def play(
         Asked before every turn; once it is true, everybody who is still out flies home.
     spare
         Asked at every turn how many threads more it may use then.
+    epsilon
+        (B,) of sampled episodes, the chance that a turn's action is any that is allowed, each as likely; none
+        where None.
     """
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
@@ -114,6 +118,9 @@ def play(
             logits = values[place] * sharpness
             logits[:, :n][pair[:count, :, 0] == 0] = -np.inf
             if rng is not None:
+                if epsilon is not None:
+                    explores = rng.random(count) < epsilon[who]
+                    logits[explores[:, None] & np.isfinite(logits)] = 0.0
                 logits = logits / temperature + rng.gumbel(size=logits.shape)
             actions = logits.argmax(axis=1)
             _, which = np.unique(place * (n + 1) + actions, return_inverse=True)

@@ -78,7 +78,7 @@ class UniversalScratch:
         temperature = Temperature(self._arrays)
         recombination = Recombination(self._arrays, self._best)
         while done < epochs and not self._stop():
-            count = min(self._tuning.episodes, epochs - done)
+            count = min(self._tuning.learned, epochs - done)
             plans = self._tuning.epoch(self._best.actions, self._stop, count, temperature.value)
             temperature.follow(plans, self._best.reward)
             recombination.consider(plans, self._stop)

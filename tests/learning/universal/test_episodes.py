@@ -8,10 +8,14 @@ from referee import replay
 
 from app.domain.records import problem_to_record
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES
+from app.learning.universal.best_plan import BestPlan
+from app.learning.universal.fine_tuning import FineTuning
 from app.learning.universal.learner import evaluate, make_batch
 from app.learning.universal.rollout import play
 from app.learning.universal.unfolding import unfold
 from app.simulation.arrays import compile_problem
+from app.simulation.generator import generate
+from app.solvers.stop import never
 
 
 def test_played_plans_are_legal_and_earn_what_was_said(make_policy):
@@ -41,6 +45,30 @@ def test_greedy_actions_are_those_of_the_unfolded_episode(make_policy):
         assert np.array_equal(chosen, turns.action)
         turns_compared += len(chosen)
     assert turns_compared > 100
+
+
+def test_exploring_turns_are_any_that_is_allowed_and_others_the_policys(make_policy):
+    rng, count = np.random.default_rng(8), 4000
+    arrays = compile_problem(generate("uniform", 3, 4, 2, rng))
+    epsilon = np.where(np.arange(count) % 2, 1.0, 0.0)
+    problem = np.zeros(count, np.int64)
+    plans = play(make_policy().agent, arrays, problem, rng, 1e-6, epsilon=epsilon).plans
+
+    assert len(np.unique(plans[::2], axis=0)) == 1
+    _, firsts = np.unique(plans[1::2, 0, 0], return_counts=True)
+    assert len(firsts) == arrays.shape[1] + 1  # every area, and home
+    expected = count / 2 / len(firsts)
+    assert np.abs(firsts - expected).max() < 5 * np.sqrt(expected)
+
+
+def test_fine_tuning_explores_in_every_other_episode(make_policy):
+    rng = np.random.default_rng(9)
+    arrays = compile_problem(generate("uniform", 3, 4, 2, rng))
+    tuning = FineTuning(make_policy(), arrays, batch_size=4, lr=1e-4, gamma=0.99, rng=rng)
+    plans = tuning.epoch(BestPlan(arrays).actions, never, temperature=1e-6)
+    assert (tuning.learned, len(plans)) == (4, 64)
+    assert len(np.unique(plans[::2], axis=0)) == 1
+    assert len(np.unique(plans[1::2], axis=0)) > 8
 
 
 def test_rewards_of_the_steps_add_up(make_policy):
