@@ -98,8 +98,10 @@ def play(
             if not count:
                 continue
             who = turn[:count]
-            # Sampled episodes begin alike: those that are still the same are asked about once.
-            _, first, place = np.unique(branch[who], return_index=True, return_inverse=True)
+            first = place = np.arange(count)
+            if rng is not None:
+                # Sampled episodes begin alike: those that are still the same are asked about once.
+                _, first, place = np.unique(branch[who], return_index=True, return_inverse=True)
             once = who[first]
             remembered = hidden[i, once]
             values = np.empty((len(first), n + 1), np.float32)
@@ -123,9 +125,10 @@ def play(
                     logits[explores[:, None] & np.isfinite(logits)] = 0.0
                 logits = logits / temperature + rng.gumbel(size=logits.shape)
             actions = logits.argmax(axis=1)
-            _, which = np.unique(place * (n + 1) + actions, return_inverse=True)
-            branch[who] = branches + which
-            branches += count
+            if rng is not None:
+                _, which = np.unique(place * (n + 1) + actions, return_inverse=True)
+                branch[who] = branches + which
+                branches += count
             _act_turn(arrays, episodes, outlook, i, who, actions, plans[:, s], rewards)
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
