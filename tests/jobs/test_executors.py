@@ -17,7 +17,9 @@ from app.jobs.model import JobStatus, Progress
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.learning.train_library import source_tasks, train_library
+from app.learning.universal import production
 from app.learning.universal.production import Production, UniversalTrainingParameters
+from app.simulation.generator import FAMILIES
 from policy_store.database import Database
 
 HERE = Path(__file__).parent
@@ -286,9 +288,11 @@ def test_a_library_is_the_same_wherever_it_was_trained(nodes, tmp_path, monkeypa
 
 def test_policies_for_every_size_are_the_same_wherever_their_parts_were_made(nodes, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(HERE.parents[1]))
+    monkeypatch.setattr(production, "FAMILIES", {name: FAMILIES[name] for name in ("uniform", "deadline")})
     made = []
     for where, cluster in (("here", None), ("there", nodes.address)):
         folder = tmp_path / where
-        production = Production(folder / "work", TINY, 1, lambda *said: None, cluster)
-        made.append([file.read_bytes() for file in production.run(folder / "library", "all")])
+        making = Production(folder / "work", TINY, 1, lambda *said: None, cluster)
+        made.append([file.read_bytes() for file in making.run(folder / "library", "all")])
     assert made[0] == made[1]
+    assert len(made[0]) == 3
