@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import random
+import re
 import sys
 import tempfile
 import time
@@ -54,12 +55,15 @@ def main() -> int:
             ends = reckon(service, ledger)
         finally:
             service.stop()
-        defects = service.log.read_text().count('"level": "error"')
+        # Not read as JSON: what was being written at a kill is half a line.
+        logged = [line for line in service.log.read_text().splitlines() if '"level": "error"' in line]
+        errors = Counter(re.search(r'"event": "([^"]*)', line)[1] for line in logged)
     _print("killed", kills)
     _print("answers", ledger.answered)
     _print("promised jobs by how they were asked for", Counter(ledger.promised.values()))
     _print("promised jobs by how they ended", ends)
-    print(f"\n{rounds} rounds in {time.monotonic() - begun:.0f} s; errors in the log: {defects}")
+    _print("errors in the log", errors)
+    print(f"\n{rounds} rounds in {time.monotonic() - begun:.0f} s")
     print(f"promises: {len(ledger.promised)}, broken: {len(ledger.broken)}")
     for line in ledger.broken[:50]:
         print(" ", line)
