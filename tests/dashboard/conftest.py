@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from dashboard_steps import PATIENCE_MS
 from live_service import LiveService
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
@@ -23,8 +24,7 @@ HOW_TO_GET_ONE = (
     f"no Chromium at {CHROMIUM}: 'apt-get install chromium', or its path in the variable CHROMIUM "
     "(REQUIRE_BROWSER=1 makes this a failure)"
 )
-PATIENCE_MS = 60_000
-"""Only a failure waits as long; a machine with other work may need a part of it."""
+
 expect.set_options(timeout=PATIENCE_MS)
 
 

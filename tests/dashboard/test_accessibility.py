@@ -2,7 +2,7 @@
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import PATIENCE_MS, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 
 RULES = {
@@ -22,7 +22,7 @@ def audited(browser, service):
     context = browser.new_context(
         viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
     )
-    context.set_default_timeout(60_000)
+    context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
     page.goto(service.url)
     ready(page)

@@ -5,6 +5,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import httpx
 import pytest
+from dashboard_steps import PATIENCE_MS
 from live_service import LiveService
 from playwright.sync_api import expect
 
@@ -73,7 +74,7 @@ def visit(browser, guarded):
 
     def opened():
         context = browser.new_context(viewport={"width": 1366, "height": 900})
-        context.set_default_timeout(60_000)
+        context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)
         page = context.new_page()
         page.said, page.asked = [], []

@@ -7,6 +7,9 @@ import json
 import httpx
 from playwright.sync_api import Page, expect
 
+PATIENCE_MS = 60_000
+"""Only a failure waits as long; a machine with other work may need a part of it."""
+
 QUICK = {"algorithm": "greedy"}
 
 
