@@ -23,6 +23,7 @@ from app.jobs import model
 from app.jobs.work_context import WorkContext
 from app.library.seeding import seed_library
 from app.logs import configure_logs
+from app.memory import limit_arenas
 from app.solvers.registry import parse_parameters
 from policy_store.backup import back_up
 from policy_store.errors import BackupFailed
@@ -53,6 +54,7 @@ def serve(
             )
             raise typer.Exit(2)
     configure_logs(settings.log_level)
+    limit_arenas()
     uvicorn.run(
         create_application(settings),
         host=settings.host,
