@@ -68,7 +68,7 @@ def ready(m: int, n: int) -> Search:
 
 def held(search: Search) -> int:
     """Return the bytes of its arrays."""
-    parts = (search.arrays, search.near, search.routes, search.change, search[4:])
+    parts = (search.arrays, search.near, search.routes, search.change, search[4:7])
     return sum(array.nbytes for part in parts for array in part)
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from brute_force import best_reward
+from brute_force_unloading import best_planned_reward
 from problems import random_problem
 from referee import replay
 
-from app.domain.problem import Objective
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import reward_of, rewards_of
@@ -16,11 +17,12 @@ from app.simulation.generator import generate
 from app.simulation.simulator import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
+from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import apply, extra_distance, feasible, undo
 from app.solvers.local_search.effort import default_moves, default_restarts
 from app.solvers.local_search.improvement import Cooling, improve
 from app.solvers.local_search.moves import draw_move
-from app.solvers.local_search.routes import USELESS
+from app.solvers.local_search.routes import SATISFACTION, USELESS
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import SolverContext
@@ -128,11 +130,39 @@ def test_annealed_plans_are_legal_and_earn_what_the_search_says():
         scale = max(float(search.arrays.level.max()), 1e-9)
         anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0)
         assert_evaluated(search)
+        assert search.routes.total[SATISFACTION] <= search.most
         drop_useless(search)
         assert search.routes.total[USELESS] == 0
         assert_evaluated(search)
         record, rows = problem_to_record(problem), actions_of(search).tolist()
         assert replay(record, rows)["reward"] == pytest.approx(search.best[0], abs=1e-9)
+
+
+def test_no_plan_satisfies_more_than_the_ceiling_whatever_distance_costs():
+    rng = np.random.default_rng(15)
+    reached = 0
+    for _ in range(60):
+        problem = random_problem(rng, max_uavs=2, max_targets=3)
+        free = replace(problem, max_steps=2, objective=replace(problem.objective, distance_weight=0.0))
+        most = most_satisfaction(compile_problem(free))
+        best = best_planned_reward(problem_to_record(free))
+        assert best <= most + 1e-12
+        reached += most > 0 and best > 0.999 * most
+    assert reached > 5
+
+
+def test_the_ceiling_gives_a_material_to_whom_it_is_worth_most():
+    def target(name, x, needs, level):
+        return Target(id=name, x=x, y=0.0, loadlist=needs, level=level)
+
+    def uav(name, loads, voyage):
+        return UAV(id=name, x_s=0.0, y_s=0.0, x_c=0.0, y_c=0.0, loadlist=loads, speed=1.0, voyage=voyage)
+
+    # Units are worth 3, 1 and 1 (out of range); five of the first material, none of the second, are carried.
+    targets = (target("a", 1.0, (4.0, 0.0), 12.0), target("b", 2.0, (6.0, 4.0), 10.0))
+    far = target("c", 50.0, (8.0, 0.0), 8.0)
+    problem = Problem(uavs=(uav("u", (5.0, 0.0), 10.0),), targets=(*targets, far), max_steps=5)
+    assert most_satisfaction(compile_problem(problem)) == pytest.approx(4 * 3 + 1 * 1, rel=1e-5)
 
 
 def test_tiny_problems_are_solved_to_the_optimum():

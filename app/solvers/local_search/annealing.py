@@ -9,6 +9,7 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_free
+from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (
     Change,
     apply,
@@ -36,6 +37,8 @@ class Search(NamedTuple):
         (M, S) and (M,) the routes of the incumbent.
     best
         (1,) its reward.
+    most
+        What no plan's satisfaction exceeds.
     """
 
     arrays: ProblemArrays
@@ -45,27 +48,30 @@ class Search(NamedTuple):
     best_target: Integers
     best_length: Integers
     best: Floats
+    most: float
 
 
 def new_search(arrays: ProblemArrays) -> Search:
     """Begin a search from the plan in which nobody flies."""
-    return _begin(arrays, neighbourhood(arrays))
+    return _begin(arrays, neighbourhood(arrays), most_satisfaction(arrays))
 
 
 def replica(search: Search) -> Search:
     """Begin another search of the same problem from the incumbent of one, for another thread."""
-    other = _begin(search.arrays, search.near)
+    other = _begin(search.arrays, search.near, search.most)
     set_routes(other, actions_of(search))
     return other
 
 
-def _begin(arrays: ProblemArrays, near: Neighbourhood) -> Search:
+def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float) -> Search:
     routes = empty_routes(arrays)
     if arrays.charge_return[0]:
         at_home = arrays.start_home[0][~arrays.ret[0]]
         routes.total[DISTANCE] = at_home.sum()
     best = np.array([-arrays.weight[0] * routes.total[DISTANCE]])
-    return Search(arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best)
+    return Search(
+        arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most
+    )
 
 
 def set_routes(search: Search, actions: Integers) -> None:
@@ -179,16 +185,19 @@ def anneal(
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
         extra = extra_distance(arrays, routes, change)
+        price = (weight + thrift) * extra + haste * extra_time(routes, change)
+        # What the change has to bring to be kept; most bring less, and of many that is known beforehand.
+        least = temperature * math.log(1.0 - rng.random())
+        if search.most - routes.total[SATISFACTION] + penalty * routes.total[USELESS] - price < least:
+            continue
         apply(arrays, routes, change, extra)
         gain = (
             routes.total[SATISFACTION]
             - change.total[SATISFACTION]
-            - weight * extra
-            - thrift * extra
-            - haste * extra_time(routes, change)
             - penalty * (routes.total[USELESS] - change.total[USELESS])
+            - price
         )
-        if gain >= 0.0 or rng.random() < math.exp(gain / temperature):
+        if gain >= least:
             kept += 1
             if gain > 0.0:
                 keep_best(search)

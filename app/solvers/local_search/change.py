@@ -138,12 +138,12 @@ def extra_distance(arrays: ProblemArrays, routes: Routes, change: Change) -> flo
 
 @compiled
 def extra_time(routes: Routes, change: Change) -> float:
-    """Time of the routes of an applied change over that of those before."""
+    """Time of the proposed routes over that of the present ones."""
     extra = 0.0
     for side in range(2):
         i = change.uav[side]
         if i != NONE:
-            extra += routes.clock[i, routes.length[i]] - change.clock[side, change.length[side]]
+            extra += change.clock[side, change.length[side]] - routes.clock[i, routes.length[i]]
     return extra
 
 

@@ -48,8 +48,8 @@ class Cooling(NamedTuple):
         otherwise its distance.
     """
 
-    hot: float = 0.05
-    cold: float = 0.002
+    hot: float = 0.1
+    cold: float = 0.005
     penalty: float = 0.03
     guide: float = 0.01
 

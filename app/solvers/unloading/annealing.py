@@ -122,6 +122,10 @@ def anneal_planned(
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
         extra = extra_distance(arrays, routes, change)
+        price = arrays.weight[0] * extra
+        least = temperature * math.log(1.0 - rng.random())
+        if search.most - tally[SATISFACTION] - price < least:
+            continue
         apply(arrays, routes, change, extra)
         concerned = _concerned(planned, routes, change)
         before = 0.0
@@ -129,10 +133,10 @@ def anneal_planned(
             planned.before[q] = planned.unloading.value[planned.unloading.served[q]]
             before += planned.before[q]
         earned = serve(arrays, visits_of_routes(routes), planned.unloading, concerned)
-        gain = earned - before - arrays.weight[0] * extra
+        gain = earned - before - price
         tally[WORK] += planned.unloading.number[2]
         planned.unloading.number[2] = 0
-        if gain >= 0.0 or rng.random() < math.exp(gain / temperature):
+        if gain >= least:
             tally[SATISFACTION] += earned - before
             if gain > 0.0:
                 keep_if_best(planned)

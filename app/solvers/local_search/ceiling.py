@@ -1,0 +1,42 @@
+"""What no plan's satisfaction exceeds: by it, many changes are known to be no good before they are made."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.simulation.arrays import Flags, ProblemArrays
+from app.simulation.simulator import TOLERANCE
+
+
+def most_satisfaction(arrays: ProblemArrays) -> float:
+    """Return an upper bound on the satisfaction of any plan, whatever the unloading rule.
+
+    Each material by itself goes to where a unit earns most, as far as what all UAVs carry of it lasts; a
+    target gets what it needs if any UAV with that material can fly there first.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    """
+    wanted = arrays.need_total[0] > 0
+    worth = arrays.level[0][wanted] / arrays.need_total[0][wanted]
+    need = arrays.need[0][wanted]
+    load = np.where(arrays.ret[0][:, None], 0.0, arrays.load[0])
+    served = (_direct(arrays)[:, wanted].T.astype(np.float64) @ (load > 0)) > 0
+    order = np.argsort(-worth, kind="stable")
+    most = np.where(served, need, 0.0)[order]
+    before = np.cumsum(most, axis=0) - most
+    unloaded = np.clip(load.sum(axis=0) - before, 0.0, most)
+    return float((worth[order] @ unloaded).sum()) * (1.0 + TOLERANCE)
+
+
+def _direct(arrays: ProblemArrays) -> Flags:
+    """(M, N) whether a UAV that flies to a target at once is in range and in time."""
+    leg = arrays.start_target[0]
+    reach = arrays.dis[0][:, None] + leg
+    if arrays.return_to_base[0]:
+        reach = reach + arrays.home[0]
+    latest = arrays.deadline[0]
+    in_range = reach <= arrays.voyage[0][:, None] * (1.0 + TOLERANCE)
+    return in_range & (leg / arrays.speed[0][:, None] <= latest + np.abs(latest) * TOLERANCE)
