@@ -39,7 +39,7 @@ _EPISODES = 64
 _EPOCH_WORK = 1e6
 """Work of these together; about as long as learning takes."""
 
-_POLISH_SHARE = 0.25
+_POLISH_SHARE = 0.2
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 
