@@ -12,7 +12,7 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
     """Return an upper bound on the satisfaction of any plan, whatever the unloading rule.
 
     Each material by itself goes to where a unit earns most, as far as what all UAVs carry of it lasts; a
-    target gets what it needs if any UAV with that material can fly there first.
+    target gets what it needs if any UAV with that material can fly there first: no way there is shorter.
 
     Parameters
     ----------
@@ -23,7 +23,8 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
     worth = arrays.level[0][wanted] / arrays.need_total[0][wanted]
     need = arrays.need[0][wanted]
     load = np.where(arrays.ret[0][:, None], 0.0, arrays.load[0])
-    served = (_direct(arrays)[:, wanted].T.astype(np.float64) @ (load > 0)) > 0
+    direct = _direct(arrays)[:, wanted]
+    served = np.stack([direct[amount > 0].any(axis=0) for amount in load.T], axis=1)
     order = np.argsort(-worth, kind="stable")
     most = np.where(served, need, 0.0)[order]
     before = np.cumsum(most, axis=0) - most
