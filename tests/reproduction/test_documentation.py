@@ -17,7 +17,7 @@ def test_the_figures_and_tables_are_as_they_were_written():
 
 def test_everything_that_the_page_shows_is_there():
     linked = re.findall(r"\]\(([^)#:]+)\)", PAGE)
-    assert len([name for name in linked if name.startswith("results/figures/")]) >= 6
+    assert len([name for name in linked if name.startswith("results/figures/")]) >= 9
     for name in linked:
         assert (FOLDER / name).exists(), name
 
