@@ -31,7 +31,7 @@ _FREE = 0.002
 """Cost of a leg between neighbours, in largest levels, below which distance is as good as free."""
 
 _FREE_HOT, _FREE_COLD = 0.3, 0.01
-"""Temperatures there: rewards of plans lie further apart, and there is nothing fine to be settled."""
+"""Temperatures there: rewards of plans lie further apart."""
 
 
 class Cooling(NamedTuple):
