@@ -20,7 +20,7 @@ from app.jobs.work_context import CANCEL, DEADLINE, WorkContext, new_control
 from app.jobs.worker import Ended, clean, resolve
 from app.logs import configure_worker_logs, labelled
 
-REPORT_INTERVAL_S = 0.1
+REPORT_INTERVAL_S = 0.5
 """Between two progresses of a job; each is a call over the network."""
 
 
