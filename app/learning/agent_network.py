@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn.functional import embedding, linear
 
 from app.learning.architecture import NetworkSizes
-from app.learning.initialisation import initialise, uninitialised_gru_cell, uninitialised_linear
+from app.learning.initialisation import UninitialisedGRUCell, UninitialisedLinear, initialise
 from app.learning.recurrence import gru
 
 
@@ -34,9 +34,9 @@ class AgentNetwork(nn.Module):
         super().__init__()
         self.sizes = sizes
         self.hidden_dim = hidden_dim
-        self.fc1 = uninitialised_linear(sizes.agent_inputs, hidden_dim)
-        self.rnn = uninitialised_gru_cell(hidden_dim, hidden_dim)
-        self.fc2 = uninitialised_linear(hidden_dim, sizes.n_actions)
+        self.fc1 = UninitialisedLinear(sizes.agent_inputs, hidden_dim)
+        self.rnn = UninitialisedGRUCell(hidden_dim, hidden_dim)
+        self.fc2 = UninitialisedLinear(hidden_dim, sizes.n_actions)
         if generator is not None:
             initialise(self.fc1, sizes.agent_inputs, generator)
             initialise(self.rnn, hidden_dim, generator)

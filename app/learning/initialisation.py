@@ -6,19 +6,20 @@ import math
 
 import torch
 from torch import nn
-from torch.nn.utils import skip_init
 
 
-def uninitialised_linear(inputs: int, outputs: int) -> nn.Linear:
-    """Make a linear layer with weights to be set; nn.Linear alone would draw them from the global state."""
-    layer: nn.Linear = skip_init(nn.Linear, inputs, outputs)  # type: ignore[no-untyped-call]  # untyped in torch
-    return layer
+class UninitialisedLinear(nn.Linear):
+    """A linear layer with weights to be set; nn.Linear alone would draw them from the global state."""
+
+    def reset_parameters(self) -> None:
+        """Leave the weights as they are."""
 
 
-def uninitialised_gru_cell(inputs: int, hidden: int) -> nn.GRUCell:
-    """Make a recurrent cell with weights to be set."""
-    cell: nn.GRUCell = skip_init(nn.GRUCell, inputs, hidden)  # type: ignore[no-untyped-call]  # untyped in torch
-    return cell
+class UninitialisedGRUCell(nn.GRUCell):
+    """A recurrent cell with weights to be set."""
+
+    def reset_parameters(self) -> None:
+        """Leave the weights as they are."""
 
 
 @torch.no_grad()

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn.functional import relu
 
 from app.learning.architecture import NetworkSizes
-from app.learning.initialisation import initialise, uninitialised_linear
+from app.learning.initialisation import UninitialisedLinear, initialise
 
 
 class JointNetwork(nn.Module):
@@ -27,9 +27,9 @@ class JointNetwork(nn.Module):
 
     def __init__(self, sizes: NetworkSizes, hidden_dim: int, generator: torch.Generator) -> None:
         super().__init__()
-        self.fc1 = uninitialised_linear(sizes.state_features, hidden_dim)
-        self.fc2 = uninitialised_linear(hidden_dim, hidden_dim)
-        self.fc3 = uninitialised_linear(hidden_dim, sizes.n_actions)
+        self.fc1 = UninitialisedLinear(sizes.state_features, hidden_dim)
+        self.fc2 = UninitialisedLinear(hidden_dim, hidden_dim)
+        self.fc3 = UninitialisedLinear(hidden_dim, sizes.n_actions)
         initialise(self.fc1, sizes.state_features, generator)
         initialise(self.fc2, hidden_dim, generator)
         initialise(self.fc3, hidden_dim, generator)

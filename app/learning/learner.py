@@ -9,6 +9,7 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
+from app.learning.functional_optimisers import RMSprop
 from app.learning.networks import ValueNetwork
 from app.learning.replay_buffer import Batch
 from app.solvers.protocol import StopCriterion
@@ -46,7 +47,7 @@ class Learner:
         self._gamma = gamma
         self._grad_norm_clip = grad_norm_clip
         self._parameters = list(network.parameters())
-        self._optimiser = torch.optim.RMSprop(self._parameters, lr=lr, foreach=True)
+        self._optimiser = RMSprop(self._parameters, lr)
 
     def targets(self, batch: Batch) -> Tensor:
         """Eq. 5: the reward, and after steps that do not end the episode the discounted value of the next.
@@ -106,7 +107,7 @@ class Learner:
         bool
             False if it was stopped: then nothing has changed.
         """
-        self._optimiser.zero_grad()
+        self.network.zero_grad()
         played = batch.filled.sum()
         for number, part in enumerate(_parts(batch)):
             if number and stop():

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn.functional import elu, relu
 
 from app.learning.architecture import NetworkSizes
-from app.learning.initialisation import initialise, uninitialised_linear
+from app.learning.initialisation import UninitialisedLinear, initialise
 
 
 class Mixer(nn.Module):
@@ -33,8 +33,8 @@ class Mixer(nn.Module):
         self.sizes = sizes
         self.hidden_dim = hidden_dim
         made = (sizes.n_agents + 3) * hidden_dim
-        self.hypernetwork = uninitialised_linear(sizes.state_features, made)
-        self.value = uninitialised_linear(hidden_dim, 1)
+        self.hypernetwork = UninitialisedLinear(sizes.state_features, made)
+        self.value = UninitialisedLinear(hidden_dim, 1)
         if generator is not None:
             initialise(self.hypernetwork, sizes.state_features, generator)
             initialise(self.value, hidden_dim, generator)

@@ -7,10 +7,12 @@ is only adjusted, Adam is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import torch
 from torch import nn
+
+from app.learning.functional_optimisers import AdamW, Optimiser
 
 WEIGHT_DECAY = 1e-4
 _MUON_WEIGHT_DECAY = 1e-2
@@ -18,17 +20,17 @@ _MUON_WEIGHT_DECAY = 1e-2
 _NARROWEST = 16
 """Smaller side of the matrices that Muon steps; those with fewer inputs or outputs have few directions."""
 
-MakeOptimisers = Callable[[nn.Module, float], list[torch.optim.Optimizer]]
+MakeOptimisers = Callable[[nn.Module, float], Sequence[Optimiser]]
 """Takes networks and the highest learning rate; every weight belongs to one of what comes back."""
 
 
-def adam(networks: nn.Module, lr: float) -> list[torch.optim.Optimizer]:
+def adam(networks: nn.Module, lr: float) -> list[AdamW]:
     """Step all weights by Adam."""
-    return [torch.optim.AdamW(networks.parameters(), lr=lr, weight_decay=WEIGHT_DECAY)]
+    return [AdamW(networks.parameters(), lr, WEIGHT_DECAY)]
 
 
 def muon(networks: nn.Module, lr: float) -> list[torch.optim.Optimizer]:
-    """Step matrices by Muon, everything else by Adam."""
+    """Step matrices by Muon, everything else by Adam, both with a state that can be kept."""
     matrices: list[torch.Tensor] = []
     rest: list[torch.Tensor] = []
     for weights in networks.parameters():

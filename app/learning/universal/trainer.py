@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -193,9 +194,13 @@ def _own(
     return make_batch(arrays, unfold(arrays, problems, played.plans), device)
 
 
+def _optimisers(learner: Learner) -> list[torch.optim.Optimizer]:
+    return cast(list[torch.optim.Optimizer], learner.optimisers)  # those of muon
+
+
 def _save(learner: Learner, done: int, path: Path) -> None:
     tensors = {f"networks.{name}": tensor for name, tensor in learner.networks.state_dict().items()}
-    for place, optimiser in enumerate(learner.optimisers):
+    for place, optimiser in enumerate(_optimisers(learner)):
         for number, slots in optimiser.state_dict()["state"].items():
             tensors |= {f"optimiser.{place}.{number}.{name}": tensor for name, tensor in slots.items()}
     partial = path.with_suffix(".part")
@@ -209,7 +214,7 @@ def _resume(learner: Learner, path: Path) -> int:
         name.removeprefix("networks."): t for name, t in tensors.items() if name.startswith("networks.")
     }
     learner.networks.load_state_dict(networks, strict=True)
-    for place, optimiser in enumerate(learner.optimisers):
+    for place, optimiser in enumerate(_optimisers(learner)):
         slots: dict[int, dict[str, torch.Tensor]] = {}
         for name, tensor in tensors.items():
             if name.startswith(f"optimiser.{place}."):

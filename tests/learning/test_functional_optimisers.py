@@ -1,0 +1,56 @@
+"""Weights step as torch's own optimisers step them, and a warm worker has not loaded torch's compiler."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+
+from app.learning.functional_optimisers import AdamW, RMSprop
+
+ROOT = Path(__file__).parents[2]
+
+
+def weights_after(make, seed, skip_one=False):
+    torch.manual_seed(seed)
+    network = torch.nn.Sequential(torch.nn.Linear(7, 5), torch.nn.Tanh(), torch.nn.Linear(5, 3))
+    if skip_one:
+        network[2].bias.requires_grad_(False)
+    optimiser = make(network.parameters())
+    for step in range(20):
+        optimiser.param_groups[0]["lr"] = 0.01 / (1 + step)
+        network.zero_grad()
+        network(torch.randn(11, 7)).square().sum().backward()
+        optimiser.step()
+    return [each.detach().clone() for each in network.parameters()]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("ours", "theirs", "skip_one"),
+    [
+        (lambda w: RMSprop(w, 0.01), lambda w: torch.optim.RMSprop(w, lr=0.01, foreach=True), False),
+        (lambda w: AdamW(w, 0.01, 0.1), lambda w: torch.optim.AdamW(w, lr=0.01, weight_decay=0.1), False),
+        (lambda w: AdamW(w, 0.01, 0.1), lambda w: torch.optim.AdamW(w, lr=0.01, weight_decay=0.1), True),
+    ],
+    ids=["rmsprop", "adamw", "adamw where a weight has no gradient"],
+)
+def test_weights_are_those_of_torch(ours, theirs, skip_one, seed):
+    pairs = list(zip(weights_after(ours, seed, skip_one), weights_after(theirs, seed, skip_one), strict=True))
+    assert pairs
+    for mine, torchs in pairs:
+        assert torch.equal(mine, torchs)
+
+
+def test_a_warm_worker_has_not_loaded_the_compiler_of_torch():
+    asked = (
+        "import sys; from app.jobs.work import warm_up; warm_up(5, 5); "
+        "print([name for name in ('torch', 'torch._dynamo', 'sympy') if name in sys.modules])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", asked],
+        capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert told.stdout.strip() == "['torch']"
