@@ -5,9 +5,12 @@ import random
 from crash_trial import KINDS, Ledger, crash, load, reckon
 from live_service import LiveService
 
+SMALL = {"max_uavs": 50, "max_targets": 100}
+"""Workers start sooner: they try how long the largest problem takes."""
+
 
 def test_every_promise_outlives_a_crash(tmp_path):
-    service, ledger, rng = LiveService(tmp_path, workers=2), Ledger(), random.Random(1)
+    service, ledger, rng = LiveService(tmp_path, workers=2, **SMALL), Ledger(), random.Random(1)
     try:
         service.start().await_ready()
         with load(service, ledger, clients=3, seed=1):

@@ -52,6 +52,8 @@ def guarded(tmp_path_factory, tiles):
     service = LiveService(
         folder,
         workers=1,
+        max_uavs=50,  # workers start sooner: they try how long the largest problem takes
+        max_targets=100,
         tile_url=f"http://127.0.0.1:{tiles.server_port}/{{z}}/{{x}}/{{y}}.png",
         tile_attribution="<b>Tiles</b> & co",
     )
