@@ -92,6 +92,10 @@ def test_others_are_not_served_without_a_usable_key(invoke, revoked):
     assert "--no-keys" in refused.stderr
 
 
+SMALL = {"ALLOCATOR_WORKERS": "1", "ALLOCATOR_MAX_UAVS": "50", "ALLOCATOR_MAX_TARGETS": "100"}
+"""A worker starts sooner: it tries how long the largest problem takes."""
+
+
 @pytest.fixture
 def serve(tmp_path):
     """Starts ``python -m app serve`` on a free port, its log in a file, and waits until it answers."""
@@ -103,9 +107,7 @@ def serve(tmp_path):
         log = tmp_path / f"log-{port}"
         command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(tmp_path)]
         with log.open("wb") as stderr:
-            process = subprocess.Popen(
-                command, stderr=stderr, cwd=ROOT, env=os.environ | {"ALLOCATOR_WORKERS": "1"} | environment
-            )
+            process = subprocess.Popen(command, stderr=stderr, cwd=ROOT, env=os.environ | SMALL | environment)
         client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=START_S)
         running.append((process, client))
         deadline = time.monotonic() + START_S

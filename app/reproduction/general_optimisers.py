@@ -1,11 +1,20 @@
 """General optimisers of vehicle routes, given our problems as well as their models allow; to compare with.
 
 Both are told of every UAV's position, range, speed, loads and step limit, of service times and deadlines, and
-maximise prizes less distance. Both lack deliveries paid by the fraction met: an area is served in one visit
-and in full, or not at all. So they cannot express
+maximise prizes less distance. A client of theirs is served in one visit and in full, or not at all, so each
+gets two models, half of the time for either, and the better plan counts:
 
-- a visit that brings part of what is needed, or one material of several, for part of the reward;
-- two UAVs that share an area;
+- an area is a client, for the whole reward, and is served by one UAV;
+- each material of an area is a client of its own, for its part of the reward, at the same place. So UAVs
+  share areas, and an area may get one material of several.
+
+They cannot express
+
+- a part of a material (materials cut in two to four were tried: more often worse, as there are more clients);
+- that a visit unloads whatever is there: plans are flown by our rule, which may leave nothing for a visit
+  that was meant to bring it; such visits are left out, and those that a step limit has no place for;
+- in PyVRP, that several clients are served in one visit: where materials are clients, the limit of steps is
+  as many times as large as there are materials;
 - in PyVRP, where distance is charged but not the leg home, a cost of distance: the cost is that of time at
   the UAV's speed, so service times are charged too, and given back through the prizes at the mean speed.
 
@@ -15,6 +24,7 @@ They are extras: ``pip install -e ".[compare]"``.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -24,6 +34,8 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
+from app.simulation.explain import reward_of
+from app.simulation.simulator import ALLOWED, act, end_step, new_episodes, verdict
 
 _RESOLUTION = 1e5
 """Units of distance and of time that the problem's extent has; both optimisers count in integers."""
@@ -49,19 +61,22 @@ class _Model(NamedTuple):
     Attributes
     ----------
     clients
-        Targets that are worth a visit.
+        (C,) the target of each client that is worth a visit.
     like
         (M,) the first UAV with the same position, speed, range and loads.
     distance, duration, charged
-        By UAV, (nodes, nodes): flown, passed, and paid for; legs home are 0 where they do not count.
+        By UAV, (nodes, nodes): flown, passed (service with the leg to it), and paid for; legs home are 0
+        where they do not count.
     longest
         (M,) what may be flown.
-    service, latest, prize
-        (N,) times and level.
+    latest
+        (N,) time at which service may end.
+    prize, share
+        (C,) reward, and share of the target's need.
     load, need
-        (M, K) and (N, K).
-    prize_scale
-        Units of an integer prize that a reward of 1 has.
+        (M, K) and (C, K).
+    most_clients
+        Of one target.
     """
 
     clients: list[int]
@@ -70,18 +85,18 @@ class _Model(NamedTuple):
     duration: dict[int, Floats]
     charged: dict[int, Floats]
     longest: Floats
-    service: Floats
     latest: Floats
     prize: Floats
+    share: Floats
     load: Floats
     need: Floats
+    most_clients: int
 
 
-def _model(problem: Problem, arrays: ProblemArrays) -> _Model:
-    m, n, _ = arrays.shape
+def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Model:
+    m, n, k = arrays.shape
     per_distance = _RESOLUTION / max(problem.extent, 1e-9)
-    speed = float(arrays.speed.mean())
-    per_time = per_distance * speed
+    per_time = per_distance * float(arrays.speed.mean())
     amounts = 1000 if max(arrays.load.max(), arrays.need.max()) < 1e6 else 1
     like: list[int] = []
     seen: dict[Any, int] = {}
@@ -89,6 +104,9 @@ def _model(problem: Problem, arrays: ProblemArrays) -> _Model:
         key = (uav.x_c, uav.y_c, uav.x_s, uav.y_s, uav.speed, uav.voyage - uav.dis, uav.loadlist, uav.ret)
         like.append(seen.setdefault(key, i))
     distance, duration, charged = {}, {}, {}
+    service = np.zeros((n + 2 * m, n + 2 * m))
+    service[:, :n] = arrays.service[0]
+    np.fill_diagonal(service, 0.0)
     for i in set(like):
         legs = np.zeros((n + 2 * m, n + 2 * m))
         legs[:n, :n] = arrays.between[0]
@@ -96,88 +114,116 @@ def _model(problem: Problem, arrays: ProblemArrays) -> _Model:
         home = legs.copy()
         home[:n, n + m + i] = arrays.home[0, i]
         distance[i] = np.ceil(per_distance * (home if problem.objective.return_to_base else legs))
-        duration[i] = np.ceil(per_time * legs / arrays.speed[0, i])
+        duration[i] = np.ceil(per_time * (legs / arrays.speed[0, i] + service))
         charged[i] = home if problem.objective.charge_return else legs
     latest = np.where(np.isfinite(arrays.deadline[0]), arrays.deadline[0] * per_time, _UNLIMITED)
+    total = arrays.need_total[0]
+    worth = [j for j in range(n) if total[j] > 0 and arrays.level[0, j] > 0 and latest[j] >= 0]
+    need = np.ceil(amounts * arrays.need[0] - 1e-9)
+    clients, needs = worth, need[worth]
+    if by_material:
+        pairs = [(j, material) for j in worth for material in range(k) if need[j, material] > 0]
+        clients = [j for j, _ in pairs]
+        needs = np.array([np.where(np.arange(k) == material, need[j], 0) for j, material in pairs])
+    share = needs.reshape(-1, k).sum(axis=1) / np.maximum(need[clients].reshape(-1, k).sum(axis=1), 1)
     return _Model(
-        clients=[
-            j for j in range(n) if arrays.need_total[0, j] > 0 and arrays.level[0, j] > 0 and latest[j] >= 0
-        ],
+        clients=clients,
         like=like,
         distance=distance,
         duration=duration,
         charged=charged,
         longest=np.maximum(0, np.floor(per_distance * (arrays.voyage[0] - arrays.dis[0]))),
-        service=np.ceil(per_time * arrays.service[0]),
-        latest=np.floor(latest),
-        prize=arrays.level[0],
+        latest=np.floor(latest + np.ceil(per_time * arrays.service[0])),
+        prize=arrays.level[0][clients] * share,
+        share=share,
         load=np.floor(amounts * arrays.load[0] + 1e-9),
-        need=np.ceil(amounts * arrays.need[0] - 1e-9),
+        need=needs,
+        most_clients=max((clients.count(j) for j in worth), default=1),
     )
 
 
-def _plan(problem: Problem, routes: list[list[int]]) -> Plan:
+def _better_plan(
+    problem: Problem, seconds: float, solve: Callable[[ProblemArrays, _Model, float], list[list[int]]]
+) -> Plan:
+    """Solve both models in half of the time each; return the better plan, by its reward."""
+    arrays = compile_problem(problem)
+    plans = [Plan.empty(problem.n_uavs, problem.n_targets)]
+    for by_material in (False, True):
+        model = _model(problem, arrays, by_material=by_material)
+        if model.clients and not all(uav.ret for uav in problem.uavs):
+            plans.append(_flown(problem, arrays, solve(arrays, model, seconds / 2)))
+    return max(plans, key=lambda plan: reward_of(problem, plan))
+
+
+def _flown(problem: Problem, arrays: ProblemArrays, routes: list[list[int]]) -> Plan:
+    """Fly routes by the rules of the simulator, without the visits that they do not allow."""
     actions = np.full((problem.max_steps, problem.n_uavs), problem.n_targets, np.int64)
-    for i, route in enumerate(routes):
-        actions[: len(route), i] = route
+    episodes = new_episodes(arrays, 1)
+    left = [list(reversed(route)) for route in routes]
+    for row in actions:
+        if episodes.done[0]:
+            break
+        for i, route in enumerate(left):
+            while route and verdict(arrays, episodes, 0, i, route[-1]) != ALLOWED:
+                route.pop()
+            if route:
+                row[i] = route.pop()
+            act(arrays, episodes, 0, i, row[i])
+        end_step(arrays, episodes, 0)
     return Plan.of(actions, problem.n_targets)
 
 
 def pyvrp_plan(problem: Problem, seconds: float, seed: int) -> Plan:
     """Return PyVRP's plan: heterogeneous vehicles, optional clients with prizes, time windows."""
+
+    def solve(arrays: ProblemArrays, model: _Model, seconds: float) -> list[list[int]]:
+        return _pyvrp_routes(problem, arrays, model, seconds, seed)
+
+    return _better_plan(problem, seconds, solve)
+
+
+def _pyvrp_routes(
+    problem: Problem, arrays: ProblemArrays, model: _Model, seconds: float, seed: int
+) -> list[list[int]]:
     import pyvrp  # noqa: PLC0415 - an extra
     from pyvrp.stop import MaxRuntime  # noqa: PLC0415
 
-    arrays = compile_problem(problem)
     m, n, _ = arrays.shape
-    model = _model(problem, arrays)
-    weight = float(arrays.weight[0])
+    weight, speeds = float(arrays.weight[0]), arrays.speed[0]
+    per_distance = _RESOLUTION / max(problem.extent, 1e-9)
     # Prizes must not be worth more than the penalties, of 1e5 a unit at most, that keep routes feasible.
     scale = 1e7 / max(float(arrays.level.max()), 1e-12)
-    speeds = arrays.speed[0]
-    unit = {
-        i: weight * speeds[i] / speeds.mean() / (_RESOLUTION / max(problem.extent, 1e-9))
-        for i in model.distance
+    unit = {i: weight * speeds[i] / speeds.mean() / per_distance for i in model.distance}
+    members = {
+        i: [q for q in range(m) if model.like[q] == i and not problem.uavs[q].ret] for i in model.distance
     }
-    types = sorted(set(model.like))
-    members = {i: [q for q in range(m) if model.like[q] == i and not problem.uavs[q].ret] for i in types}
-    types = [i for i in types if members[i]]
-    if not types or not model.clients:
-        return Plan.empty(m, n)
+    types = sorted(i for i in members if members[i])
     # Time passed costs what was flown in it; with charge_return the leg home takes time for the same reason.
     durations = [
         np.where(
             (model.charged[i] > 0) & (model.duration[i] == 0),
-            np.ceil(
-                model.charged[i]
-                / arrays.speed[0, i]
-                * _RESOLUTION
-                / max(problem.extent, 1e-9)
-                * speeds.mean()
-            ),
+            np.ceil(model.charged[i] / speeds[i] * per_distance * speeds.mean()),
             model.duration[i],
         ).astype(np.int64)
         for i in types
     ]
-    refund = weight * float(speeds.mean()) * arrays.service[0]
+    refund = weight * float(speeds.mean()) * arrays.service[0][model.clients] * model.share
     locations = [pyvrp.Location(0, 0) for _ in range(n + 2 * m)]
     depots = [pyvrp.Depot(n + q) for q in range(2 * m)]
     clients = [
         pyvrp.Client(
             location=j,
-            delivery=[*(int(amount) for amount in model.need[j]), 1],
-            service_duration=int(model.service[j]),
-            # A time window is about the beginning of service.
+            delivery=[*(int(amount) for amount in need), 1],
             tw_late=int(model.latest[j]),
-            prize=round(scale * (model.prize[j] + refund[j])),
+            prize=round(scale * (prize + back)),
             required=False,
         )
-        for j in model.clients
+        for j, need, prize, back in zip(model.clients, model.need, model.prize, refund, strict=True)
     ]
     vehicles = [
         pyvrp.VehicleType(
             num_available=len(members[i]),
-            capacity=[*(int(amount) for amount in model.load[i]), problem.max_steps],
+            capacity=[*(int(amount) for amount in model.load[i]), problem.max_steps * model.most_clients],
             start_depot=i,
             end_depot=m + i,
             max_distance=int(model.longest[i]),
@@ -193,28 +239,31 @@ def pyvrp_plan(problem: Problem, seconds: float, seed: int) -> Plan:
         locations, clients, depots, vehicles, [model.distance[i].astype(np.int64) for i in types], durations
     )
     found = pyvrp.solve(data, MaxRuntime(seconds), seed=seed, display=False).best
-    free = {i: list(uavs) for i, uavs in members.items()}
+    free = {i: list(members[i]) for i in types}
     routes: list[list[int]] = [[] for _ in range(m)]
     if found.is_feasible():
         for route in found.routes():
-            routes[free[types[route.vehicle_type()]].pop()] = [model.clients[c] for c in _clients(route)]
-    return _plan(problem, routes)
-
-
-def _clients(route: Any) -> list[int]:
-    return [each.idx for each in route if each.is_client()]
+            visits = [model.clients[each.idx] for each in route if each.is_client()]
+            routes[free[types[route.vehicle_type()]].pop()] = visits
+    return routes
 
 
 def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: ARG001 - it draws nothing
     """Return the plan of OR-Tools routing: guided local search, disjunctions with penalties."""
+
+    def solve(arrays: ProblemArrays, model: _Model, seconds: float) -> list[list[int]]:
+        return _routing_routes(problem, arrays, model, seconds)
+
+    return _better_plan(problem, seconds, solve)
+
+
+def _routing_routes(
+    problem: Problem, arrays: ProblemArrays, model: _Model, seconds: float
+) -> list[list[int]]:
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # noqa: PLC0415 - an extra
 
-    arrays = compile_problem(problem)
     m, n, k = arrays.shape
-    model = _model(problem, arrays)
     out = [i for i in range(m) if not problem.uavs[i].ret]
-    if not out or not model.clients:
-        return Plan.empty(m, n)
     scale = 1e6
     nodes = [*model.clients, *(n + i for i in out), *(n + m + i for i in out)]
     count = len(model.clients)
@@ -239,7 +288,7 @@ def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: 
         matrix = {
             "cost": scale * weight * model.charged[like][chosen],
             "distance": model.distance[like][chosen],
-            "time": model.duration[like][chosen] + np.append(model.service, np.zeros(2 * m))[nodes][:, None],
+            "time": model.duration[like][chosen],
         }[name]
         if like != i:
             rows, columns = count + out.index(i), count + len(out) + out.index(i)
@@ -256,15 +305,16 @@ def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: 
     )
     model_.AddDimensionWithVehicleTransits([of_uav("time", i) for i in out], 0, _UNLIMITED, True, "time")
     times = model_.GetDimensionOrDie("time")
-    for each in range(k + 1):
-        taken = [1] * count if each == k else [int(model.need[j, each]) for j in model.clients]
-        room = [problem.max_steps] * len(out) if each == k else [int(model.load[i, each]) for i in out]
-        taken += [0] * (2 * len(out))
+    visits = registered(np.not_equal.outer(nodes, nodes) * (np.array(nodes) < n))
+    model_.AddDimension(visits, 0, problem.max_steps, True, "visits")
+    for each in range(k):
+        taken = [int(amount) for amount in model.need[:, each]] + [0] * (2 * len(out))
         index = model_.RegisterUnaryTransitVector(taken)
+        room = [int(model.load[i, each]) for i in out]
         model_.AddDimensionWithVehicleCapacity(index, 0, room, True, f"load {each}")
     for c, j in enumerate(model.clients):
         node = manager.NodeToIndex(c)
-        model_.AddDisjunction([node], round(scale * model.prize[j]))
+        model_.AddDisjunction([node], round(scale * model.prize[c]))
         times.CumulVar(node).SetMax(int(model.latest[j]))
     options = pywrapcp.DefaultRoutingSearchParameters()
     options.first_solution_strategy = routing_enums_pb2.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
@@ -278,4 +328,4 @@ def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: 
             while not model_.IsEnd(at):
                 routes[i].append(model.clients[manager.IndexToNode(at)])
                 at = found.Value(model_.NextVar(at))
-    return _plan(problem, routes)
+    return routes
