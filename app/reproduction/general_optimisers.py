@@ -2,7 +2,7 @@
 
 Both are told of every UAV's position, range, speed, loads and step limit, of service times and deadlines, and
 maximise prizes less distance. A client of theirs is served in one visit and in full, or not at all, so each
-gets two models, half of the time for either, and the better plan counts:
+gets two models, half of the time for either, and the better plan counts (one, where they are the same):
 
 - an area is a client, for the whole reward, and is served by one UAV;
 - each material of an area is a client of its own, for its part of the reward, at the same place. So UAVs
@@ -145,14 +145,18 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
 def _better_plan(
     problem: Problem, seconds: float, solve: Callable[[ProblemArrays, _Model, float], list[list[int]]]
 ) -> Plan:
-    """Solve both models in half of the time each; return the better plan, by its reward."""
+    """Solve both models in half of the time each, if they differ; return the better plan, by its reward."""
     arrays = compile_problem(problem)
-    plans = [Plan.empty(problem.n_uavs, problem.n_targets)]
-    for by_material in (False, True):
-        model = _model(problem, arrays, by_material=by_material)
-        if model.clients and not all(uav.ret for uav in problem.uavs):
-            plans.append(_flown(problem, arrays, solve(arrays, model, seconds / 2)))
-    return max(plans, key=lambda plan: reward_of(problem, plan))
+    empty = Plan.empty(problem.n_uavs, problem.n_targets)
+    models = [_model(problem, arrays, by_material=by_material) for by_material in (False, True)]
+    if not models[0].clients or all(uav.ret for uav in problem.uavs):
+        return empty
+    if models[1].most_clients == 1:
+        models.pop()
+    routes = [solve(arrays, model, seconds / len(models)) for model in models]
+    return max(
+        (empty, *(_flown(problem, arrays, each) for each in routes)), key=lambda p: reward_of(problem, p)
+    )
 
 
 def _flown(problem: Problem, arrays: ProblemArrays, routes: list[list[int]]) -> Plan:
