@@ -42,6 +42,9 @@ _RESOLUTION = 1e5
 
 _UNLIMITED = 2**40
 
+_VISIT = 1000
+"""Units of a visit in PyVRP, where one unit too many costs 1e5 at most: less than the prize of a client."""
+
 
 def require(package: str) -> None:
     """Refuse to go on without a package.
@@ -217,7 +220,7 @@ def _pyvrp_routes(
     clients = [
         pyvrp.Client(
             location=j,
-            delivery=[*(int(amount) for amount in need), 1],
+            delivery=[*(int(amount) for amount in need), _VISIT],
             tw_late=int(model.latest[j]),
             prize=round(scale * (prize + back)),
             required=False,
@@ -227,7 +230,10 @@ def _pyvrp_routes(
     vehicles = [
         pyvrp.VehicleType(
             num_available=len(members[i]),
-            capacity=[*(int(amount) for amount in model.load[i]), problem.max_steps * model.most_clients],
+            capacity=[
+                *(int(amount) for amount in model.load[i]),
+                _VISIT * problem.max_steps * model.most_clients,
+            ],
             start_depot=i,
             end_depot=m + i,
             max_distance=int(model.longest[i]),
