@@ -80,17 +80,35 @@ class StopCriterion(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+MOST_EVALUATIONS = 10_000
+"""In a history; even."""
+
+
+@dataclass(slots=True)
 class History:
-    """Reward against epoch, as in the paper's figures; two lists of one length."""
+    """Reward against epoch, as in the paper's figures; two lists of one length.
+
+    A long run would make an answer that takes long to send: beyond :data:`MOST_EVALUATIONS` every second
+    evaluation is dropped, and from then on only every second one kept, and so on. The first and the newest
+    stay.
+    """
 
     epoch: list[int] = field(default_factory=list)
     reward: list[float] = field(default_factory=list)
+    _every: int = field(default=1, init=False, repr=False, compare=False)
+    _since_kept: int = field(default=0, init=False, repr=False, compare=False)
 
     def add(self, epoch: int, reward: float) -> None:
         """Append one evaluation."""
+        if self._since_kept:
+            self.epoch.pop()
+            self.reward.pop()
         self.epoch.append(epoch)
         self.reward.append(reward)
+        self._since_kept = (self._since_kept + 1) % self._every
+        if len(self.epoch) > MOST_EVALUATIONS and not self._since_kept:
+            del self.epoch[1::2], self.reward[1::2]
+            self._every *= 2
 
 
 @dataclass(frozen=True, slots=True)
