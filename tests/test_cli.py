@@ -13,6 +13,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from live_service import SMALL
 from typer.testing import CliRunner
 
 from app.api.access.keys import KeyStore, Role, recognise
@@ -92,8 +93,7 @@ def test_others_are_not_served_without_a_usable_key(invoke, revoked):
     assert "--no-keys" in refused.stderr
 
 
-SMALL = {"ALLOCATOR_WORKERS": "1", "ALLOCATOR_MAX_UAVS": "50", "ALLOCATOR_MAX_TARGETS": "100"}
-"""A worker starts sooner: it tries how long the largest problem takes."""
+ONE_WORKER = {f"ALLOCATOR_{name.upper()}": str(value) for name, value in {"workers": 1, **SMALL}.items()}
 
 
 @pytest.fixture
@@ -107,7 +107,9 @@ def serve(tmp_path):
         log = tmp_path / f"log-{port}"
         command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(tmp_path)]
         with log.open("wb") as stderr:
-            process = subprocess.Popen(command, stderr=stderr, cwd=ROOT, env=os.environ | SMALL | environment)
+            process = subprocess.Popen(
+                command, stderr=stderr, cwd=ROOT, env=os.environ | ONE_WORKER | environment
+            )
         client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=START_S)
         running.append((process, client))
         deadline = time.monotonic() + START_S

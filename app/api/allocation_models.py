@@ -174,5 +174,5 @@ class Allocation(AnswerModel):
     routes: list[RouteModel] = Field(description="One a UAV")
     unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
     source_policy: SourcePolicyModel | None = Field(description="What was transferred, if anything")
-    history: HistoryModel = Field(description="Reward against epoch")
+    history: HistoryModel = Field(description="Reward against epoch; thinned evenly beyond 10,000")
     elapsed_s: float = Field(description="Seconds from the request's arrival to the plan")

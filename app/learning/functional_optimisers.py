@@ -7,7 +7,7 @@ torch, called here with the defaults of these objects; the weights come out the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import torch
@@ -37,7 +37,7 @@ class RMSprop:
     Parameters
     ----------
     weights
-        Stepped together; each has a gradient whenever :meth:`step` is called.
+        Stepped together; those without a gradient are left as they are.
     lr
         Learning rate.
 
@@ -49,20 +49,19 @@ class RMSprop:
 
     def __init__(self, weights: Iterable[Tensor], lr: float) -> None:
         self.param_groups: list[dict[str, Any]] = [{"lr": lr}]
-        self._weights = list(weights)
-        self._squares = [torch.zeros_like(each) for each in self._weights]
-        self._steps = [torch.zeros(()) for _ in self._weights]
+        self._slots = [(each, torch.zeros_like(each), torch.zeros(())) for each in weights]
 
     @torch.no_grad()
     def step(self) -> None:
-        """Change the weights by their gradients."""
+        """Change the weights that have a gradient."""
+        weights, gradients, squares, steps = _with_gradient(self._slots)
         rmsprop(
-            self._weights,
-            _gradients(self._weights),
-            self._squares,
+            weights,
+            gradients,
+            squares,
             [],
             [],
-            self._steps,
+            steps,
             foreach=True,
             lr=self.param_groups[0]["lr"],
             alpha=0.99,
@@ -101,13 +100,10 @@ class AdamW:
     @torch.no_grad()
     def step(self) -> None:
         """Change the weights that have a gradient."""
-        slots = [slot for slot in self._slots if slot[0].grad is not None]
-        if not slots:
-            return
-        weights, means, squares, steps = (list(column) for column in zip(*slots, strict=True))
+        weights, gradients, means, squares, steps = _with_gradient(self._slots)
         adamw(
             weights,
-            _gradients(weights),
+            gradients,
             means,
             squares,
             [],
@@ -123,6 +119,7 @@ class AdamW:
         )
 
 
-def _gradients(weights: list[Tensor]) -> list[Tensor]:
-    gradients = [each.grad for each in weights]
-    return [gradient for gradient in gradients if gradient is not None]
+def _with_gradient(slots: Sequence[tuple[Tensor, ...]]) -> list[list[Tensor]]:
+    """Return the weights that have a gradient, their gradients, and each of what is kept of them."""
+    rows = [(slot[0], slot[0].grad, *slot[1:]) for slot in slots if slot[0].grad is not None]
+    return [[row[column] for row in rows] for column in range(len(slots[0]) + 1)]

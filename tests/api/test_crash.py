@@ -3,10 +3,7 @@
 import random
 
 from crash_trial import KINDS, Ledger, crash, load, reckon
-from live_service import LiveService
-
-SMALL = {"max_uavs": 50, "max_targets": 100}
-"""Workers start sooner: they try how long the largest problem takes."""
+from live_service import SMALL, LiveService
 
 
 def test_every_promise_outlives_a_crash(tmp_path):

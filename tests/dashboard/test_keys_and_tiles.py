@@ -6,7 +6,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import httpx
 import pytest
 from dashboard_steps import PATIENCE_MS
-from live_service import LiveService
+from live_service import SMALL, LiveService
 from playwright.sync_api import expect
 
 from app.api.access.keys import KeyStore, Role
@@ -52,8 +52,7 @@ def guarded(tmp_path_factory, tiles):
     service = LiveService(
         folder,
         workers=1,
-        max_uavs=50,  # workers start sooner: they try how long the largest problem takes
-        max_targets=100,
+        **SMALL,
         tile_url=f"http://127.0.0.1:{tiles.server_port}/{{z}}/{{x}}/{{y}}.png",
         tile_attribution="<b>Tiles</b> & co",
     )

@@ -16,29 +16,21 @@ from app.solvers.greedy import greedy_plan
 OPTIMISERS = {"PyVRP": pyvrp_plan, "OR-Tools": routing_plan}
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("need", "loads", "max_steps"),
+    [((1.0,), ((3.0,), (3.0,)), 2), ((1.0, 1.0), ((3.0, 0.0), (0.0, 3.0)), 3)],
+    ids=["every area is served in full", "UAVs share areas that need what none of them has alone"],
+)
 @pytest.mark.parametrize("name", OPTIMISERS)
-def test_where_every_area_is_served_in_full_the_best_plan_is_found(name):
-    for seed in range(4):
-        problem = generate("uniform", 2, 3, 1, np.random.default_rng([5, seed]))
-        targets = tuple(replace(t, loadlist=(1.0,)) for t in problem.targets)
-        uavs = tuple(replace(u, loadlist=(3.0,)) for u in problem.uavs)
-        problem = replace(problem, targets=targets, uavs=uavs, max_steps=2)
-        record = problem_to_record(problem)
-        plan = OPTIMISERS[name](problem, 0.2, 1)
-        assert replay(record, plan.assignment)["reward"] == pytest.approx(best_reward(record), abs=1e-4)
-
-
-@pytest.mark.parametrize("name", OPTIMISERS)
-def test_uavs_share_an_area_that_needs_what_none_of_them_has_alone(name):
-    for seed in range(4):
-        problem = generate("uniform", 2, 3, 2, np.random.default_rng([8, seed]))
-        targets = tuple(replace(t, loadlist=(1.0, 1.0)) for t in problem.targets)
-        loads = (3.0, 0.0), (0.0, 3.0)
-        uavs = tuple(replace(u, loadlist=load) for u, load in zip(problem.uavs, loads, strict=True))
-        problem = replace(problem, targets=targets, uavs=uavs, max_steps=3)
-        record = problem_to_record(problem)
-        plan = OPTIMISERS[name](problem, 0.4, 1)
-        assert replay(record, plan.assignment)["reward"] == pytest.approx(best_reward(record), abs=1e-4)
+def test_the_best_plan_is_found(name, need, loads, max_steps, seed):
+    problem = generate("uniform", 2, 3, len(need), np.random.default_rng([5, seed]))
+    targets = tuple(replace(t, loadlist=need) for t in problem.targets)
+    uavs = tuple(replace(u, loadlist=load) for u, load in zip(problem.uavs, loads, strict=True))
+    problem = replace(problem, targets=targets, uavs=uavs, max_steps=max_steps)
+    record = problem_to_record(problem)
+    plan = OPTIMISERS[name](problem, 0.4, 1)
+    assert replay(record, plan.assignment)["reward"] == pytest.approx(best_reward(record), abs=1e-4)
 
 
 @pytest.mark.parametrize("name", OPTIMISERS)

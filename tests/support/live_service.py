@@ -16,6 +16,9 @@ from typing import Self
 import httpx
 
 ROOT = Path(__file__).parents[2]
+SMALL = {"max_uavs": 50, "max_targets": 100}
+"""Limits with which workers start sooner: they try how long the largest problem takes."""
+
 _READY_WITHIN_S = 300.0
 _ENDS_WITHIN_S = 60.0
 _SAMPLE = re.compile(r"^(\w+)(\{.*\})? (\S+)$", re.MULTILINE)
