@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Iterator
 from typing import cast
 
@@ -13,7 +14,7 @@ from app.learning.functional_optimisers import RMSprop
 from app.learning.networks import ValueNetwork
 from app.learning.replay_buffer import Batch
 from app.solvers.protocol import StopCriterion
-from app.solvers.stop import never
+from app.solvers.stop import never, seconds_left
 
 _WORK_A_PART = 1_000_000
 """Numbers that one part of an update goes through, in and out of the network, about."""
@@ -48,6 +49,7 @@ class Learner:
         self._grad_norm_clip = grad_norm_clip
         self._parameters = list(network.parameters())
         self._optimiser = RMSprop(self._parameters, lr)
+        self._part_s = 0.0
 
     def targets(self, batch: Batch) -> Tensor:
         """Eq. 5: the reward, and after steps that do not end the episode the discounted value of the next.
@@ -100,7 +102,7 @@ class Learner:
         batch
             Large ones are worked off some episodes at a time, whose gradients add up to the batch's.
         stop
-            Asked between them.
+            Asked before each and within it; none is begun that would take longer than it leaves.
 
         Returns
         -------
@@ -109,13 +111,21 @@ class Learner:
         """
         self.network.zero_grad()
         played = batch.filled.sum()
-        for number, part in enumerate(_parts(batch)):
-            if number and stop():
+        begun = 0.0
+        for part in _parts(batch):
+            left = seconds_left(stop)
+            if stop() or (left is not None and left < self._part_s):
                 return False
-            self.loss(part, played).backward()  # type: ignore[no-untyped-call]
+            begun = time.monotonic()
+            loss = self.loss(part, played)
+            if stop():
+                return False
+            loss.backward()  # type: ignore[no-untyped-call]
+            self._part_s = time.monotonic() - begun
         norm = nn.utils.clip_grad_norm_(self._parameters, self._grad_norm_clip, foreach=True)
         if torch.isfinite(norm):
             self._optimiser.step()
+        self._part_s = time.monotonic() - begun
         self.updates += 1
         return True
 

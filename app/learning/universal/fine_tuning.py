@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import time
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from app.learning.universal.learner import Learner, make_batch
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.rollout import play
 from app.learning.universal.unfolding import unfold
+from app.learning.universal.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays, stack
 from app.solvers.protocol import StopCriterion
+from app.solvers.stop import seconds_left
 
 TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
@@ -83,6 +86,7 @@ class FineTuning:
         tokens = m * int(arrays.max_steps[0]) * (n + 1)
         self._learned = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
         self._played = episodes_of(arrays, self._learned)
+        self._time = UpdateTime(arrays, policy.config)
         self._learner = Learner(self.policy.agent, self.policy.mixer, lr=lr, td_weight=0.2, gamma=gamma)
 
     @property
@@ -100,7 +104,7 @@ class FineTuning:
         best
             (S, M) the best plan there is; one that flies nowhere is not learned from.
         stop
-            Once it is true nothing more is learned.
+            Once it is true nothing more is learned, nor where it leaves less time than that will take.
         episodes
             How many; where None as many more than :attr:`learned` as are quickly played.
         temperature
@@ -111,16 +115,25 @@ class FineTuning:
         plans = play(
             self.policy.agent, self._arrays, problem, self._rng, temperature, stop, epsilon=epsilon
         ).plans
-        if self._epochs % _TD_EVERY == 0 and not stop():
-            self._learn(plans[: self._learned], imitate=False)
+        if self._epochs % _TD_EVERY == 0:
+            self._learn(plans[: self._learned], stop, imitate=False)
         self._epochs += 1
-        if (best < self._arrays.shape[1]).any() and not stop():
-            self._learn(best[None], imitate=True)
+        if (best < self._arrays.shape[1]).any():
+            self._learn(best[None], stop, imitate=True)
         return plans
 
-    def _learn(self, plans: Integers, *, imitate: bool) -> None:
+    def _learn(self, plans: Integers, stop: StopCriterion, *, imitate: bool) -> None:
+        """Take one step, unless its time is up, or would be before its end."""
+        begun, left = time.monotonic(), seconds_left(stop)
+        n = self._arrays.shape[1]
+        visits_and_returns = int((plans < n).sum()) + plans.shape[0] * plans.shape[2]
+        expected = self._time.expected(visits_and_returns, bootstrap=not imitate)
+        if stop() or (left is not None and expected > left):
+            return
         problem = np.zeros(len(plans), np.int64)
         turns = unfold(self._arrays, problem, plans)
         stacked = stack([self._arrays] * len(plans))
         batch = make_batch(stacked, turns, self._device)
-        self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate)
+        if self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate, stop=stop):
+            took = time.monotonic() - begun
+            self._time.took(visits_and_returns, took, bootstrap=not imitate)

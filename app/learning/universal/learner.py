@@ -21,6 +21,8 @@ from app.learning.universal.observation import scales
 from app.learning.universal.optimiser import MakeOptimisers, adam
 from app.learning.universal.unfolding import Turns
 from app.simulation.arrays import ProblemArrays
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
 
 
 class Batch(NamedTuple):
@@ -138,7 +140,15 @@ class Learner:
         self.networks = nn.ModuleList((self._trained, self._targets))
         self.optimisers = optimisers(self._trained, lr)
 
-    def update(self, batch: Batch, share_of_lr: float, *, imitate: bool, bootstrap: bool) -> dict[str, float]:
+    def update(
+        self,
+        batch: Batch,
+        share_of_lr: float,
+        *,
+        imitate: bool,
+        bootstrap: bool,
+        stop: StopCriterion = never,
+    ) -> dict[str, float]:
         """Take one step, and return the losses by name: ``imitation``, ``td``.
 
         Parameters
@@ -151,19 +161,27 @@ class Learner:
             Whether the actions are worth imitating: adds the cross-entropy.
         bootstrap
             Adds the TD loss; at least one of the two.
+        stop
+            Asked between the parts. Where it is true nothing has changed, and there are no losses.
         """
         for optimiser in self.optimisers:
             for group in optimiser.param_groups:
                 group["lr"] = self._lr * share_of_lr
         online = evaluate(self.agent, batch)
+        if stop():
+            return {}
         losses = {}
         if imitate:
             logits = self.agent.logits(online.values).masked_fill(~online.allowed, -1e9)
             losses["imitation"] = functional.cross_entropy(logits, batch.action)
         if bootstrap:
             losses["td"] = self._td_weight * self._td_loss(batch, online)
+            if stop():
+                return {}
         self._trained.zero_grad(set_to_none=True)
         torch.stack(list(losses.values())).sum().backward()  # type: ignore[no-untyped-call]  # untyped in torch
+        if stop():
+            return {}
         nn.utils.clip_grad_norm_(self._trained.parameters(), 1.0)
         for optimiser in self.optimisers:
             optimiser.step()

@@ -1,5 +1,7 @@
 """The learner: targets by hand, a handful of demonstrations learned by heart, targets that follow slowly."""
 
+import copy
+
 import numpy as np
 import pytest
 import torch
@@ -93,3 +95,15 @@ def test_every_weight_is_trained(make_policy, batch):
         learner.update(batch, 1.0, imitate=True, bootstrap=True)
     same = [name for name, p in policy.named_parameters() if torch.equal(p, before[name])]
     assert same == []
+
+
+@pytest.mark.parametrize("asked", [1, 2, 3])
+def test_an_update_that_is_stopped_changes_nothing(make_policy, batch, asked):
+    policy = make_policy(5)
+    learner = Learner(policy.agent, policy.mixer, lr=1e-2, td_weight=0.2)
+    before = copy.deepcopy(learner.networks.state_dict())
+    answers = iter([False] * (asked - 1) + [True])
+    assert learner.update(batch, 1.0, imitate=True, bootstrap=True, stop=lambda: next(answers)) == {}
+    after = learner.networks.state_dict()
+    assert all(torch.equal(after[name], tensor) for name, tensor in before.items())
+    assert next(answers, None) is None, "it went on after it was told to stop"
