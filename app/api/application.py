@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 import re
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI
@@ -77,8 +78,8 @@ def create_application(settings: Settings) -> FastAPI:
             service = JobService(
                 database,
                 job_kinds(store, limits),
-                _workers(settings, database.environment),
-                reserve=_local(1, _WARM_UP_RESERVE, settings, database.environment),
+                _workers(settings, database),
+                reserve=_local(1, _WARM_UP_RESERVE, _largest(settings), settings, database),
                 max_queued={
                     "interactive": settings.queue_limit,
                     "batch": settings.batch_limit,
@@ -123,17 +124,18 @@ def create_application(settings: Settings) -> FastAPI:
     return application
 
 
-def _workers(settings: Settings, secrets: Mapping[str, str]) -> Executor:
-    """Make what runs the jobs; ``secrets`` are variables under which it can open the database."""
+def _workers(settings: Settings, database: Database) -> Executor:
+    """Make what runs the jobs."""
+    arguments = *_largest(settings), database.url
     if settings.executor == "local":
-        return _local(settings.workers, _WARM_UP, settings, secrets)
+        return _local(settings.workers, _WARM_UP, arguments, settings, database)
     return RayExecutor(
         settings.workers,
         address=settings.ray_address,
         resources=settings.worker_resources,
         warm_up=_WARM_UP,
-        warm_up_arguments=_largest(settings),
-        environment={**SINGLE_THREADED, **KEEPS_MEMORY, **secrets},
+        warm_up_arguments=arguments,
+        environment=_environment(database),
         log_level=settings.log_level,
     )
 
@@ -143,14 +145,21 @@ def _largest(settings: Settings) -> tuple[int, int]:
     return settings.max_uavs, settings.max_targets
 
 
-def _local(slots: int, warm_up: str, settings: Settings, secrets: Mapping[str, str]) -> LocalExecutor:
+def _local(
+    slots: int, warm_up: str, arguments: tuple[Any, ...], settings: Settings, database: Database
+) -> LocalExecutor:
     return LocalExecutor(
         slots,
         warm_up=warm_up,
-        warm_up_arguments=_largest(settings),
-        environment={**SINGLE_THREADED, **KEEPS_MEMORY, **secrets},
+        warm_up_arguments=arguments,
+        environment=_environment(database),
         log_level=settings.log_level,
     )
+
+
+def _environment(database: Database) -> dict[str, str]:
+    """Return the variables of a worker; under some of them it can open the database."""
+    return {**SINGLE_THREADED, **KEEPS_MEMORY, **database.environment}
 
 
 def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:

@@ -21,7 +21,7 @@ _WHOLE_WAY = 5.0
 it goes through a pipe, is stored, and is written and checked once more. Measured at 1000 x 2000."""
 
 _EXPLAINING_SHARE = 0.25
-"""Of a short time limit, at most, that is kept for reasons; what is not found out by then is left out."""
+"""Of a short time limit, at most, that is kept to look for reasons; those not found by then are left out."""
 
 _REMEMBERED = 16
 _FORGETTING = 0.8
@@ -37,12 +37,17 @@ class AnswerTime:
 
     def __init__(self) -> None:
         self._explaining: deque[float] = deque(maxlen=_REMEMBERED)
+        self._tracing: deque[float] = deque(maxlen=_REMEMBERED)
         self._writing: deque[float] = deque(maxlen=_REMEMBERED)
         self._overrun: dict[tuple[str, int], float] = {}
 
     def explained(self, problem: Problem, seconds: float) -> None:
         """Note how long it took to explain a plan of a problem, with all the reasons there are."""
         self._explaining.append(seconds / _units(problem))
+
+    def traced(self, problem: Problem, seconds: float) -> None:
+        """Note how long it took to explain one with the reasons alone for which nobody has to look."""
+        self._tracing.append(seconds / _units(problem))
 
     def wrote(self, problem: Problem, seconds: float) -> None:
         """Note how long it took to write an answer down."""
@@ -56,12 +61,13 @@ class AnswerTime:
     def forget(self) -> None:
         """Begin anew: what was measured first had something to load."""
         self._explaining.clear()
+        self._tracing.clear()
         self._writing.clear()
         self._overrun.clear()
 
     def way_back(self, problem: Problem) -> float:
-        """Return the seconds from an explained plan to the client."""
-        return _FIXED_S + _WHOLE_WAY * _median(self._writing) * _units(problem)
+        """Return the seconds from a plan to the client, without looking for reasons."""
+        return _FIXED_S + (_median(self._tracing) + _WHOLE_WAY * _median(self._writing)) * _units(problem)
 
     def kept_back(self, problem: Problem, left_s: float) -> float:
         """Return the seconds before the end of the time limit at which the search should stop.
@@ -73,8 +79,8 @@ class AnswerTime:
         left_s
             Seconds until the limit; negative where it has passed.
         """
-        explaining = _median(self._explaining) * _units(problem)
-        return self.way_back(problem) + max(0.0, min(_EXPLAINING_SHARE * left_s, explaining))
+        looking = max(0.0, _median(self._explaining) - _median(self._tracing)) * _units(problem)
+        return self.way_back(problem) + max(0.0, min(_EXPLAINING_SHARE * left_s, looking))
 
     def is_too_short(self, algorithm: str, problem: Problem, left_s: float) -> bool:
         """Say whether an algorithm would only prepare in the seconds that are left to it.

@@ -29,6 +29,7 @@ from app.solvers.registry import create_solver, parse_parameters
 
 _VERIFY = "app.learning.checkpoint:verify"
 _WARM_UP_TRANSFER = "app.learning.universal.warm_up:warm_up"
+_PRELOAD = "app.learning.source_policies:preload"
 
 _answer_time = AnswerTime()
 _LARGEST_TRIED = (1000, 2000)
@@ -199,13 +200,15 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
     return WorkResult({}, checkpoint)
 
 
-def warm_up(most_uavs: int = 50, most_targets: int = 100) -> None:
+def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | None = None) -> None:
     """Load and compile what every kind of job needs, so that nobody waits for it later.
 
     Parameters
     ----------
     most_uavs, most_targets
         Size of the largest problem that is to be expected; how long answers take is tried on it.
+    library_url
+        Database with the source policies that jobs will ask for.
     """
     problem = _small_problem()
     for algorithm, parameters in _WARM_UP_PARAMETERS.items():
@@ -213,6 +216,8 @@ def warm_up(most_uavs: int = 50, most_targets: int = 100) -> None:
         if work.artifact is not None:
             _verify(work.artifact, problem)
     _named(_WARM_UP_TRANSFER)(problem)
+    if library_url is not None:
+        _named(_PRELOAD)(library_url, problem)
     bounding.warm_up(problem)
     compile_problem(replace(problem, crs="wgs84"))
     _time_answers(most_uavs, most_targets)
@@ -248,6 +253,7 @@ def _time_answers(most_uavs: int, most_targets: int) -> None:
     _answer_time.forget()
     for _ in range(3):
         allocate_at_once(_request(largest, "greedy", {}), _unlimited())
+        allocate_at_once(_request(largest, "greedy", {}), WorkContext.in_process(_untold, time_limit_s=0.0))
 
 
 def _small_problem() -> Problem:
@@ -272,18 +278,24 @@ def _request(problem: Problem, algorithm: str, parameters: dict[str, Any]) -> di
 
 
 def _unlimited() -> WorkContext:
-    return WorkContext.in_process(lambda _progress: None, time_limit_s=None)
+    return WorkContext.in_process(_untold, time_limit_s=None)
+
+
+def _untold(_progress: Progress) -> None:
+    """Nobody waits for a warm-up's progress."""
 
 
 def _explained(problem: Problem, plan: Plan, limit: TimeLimit) -> dict[str, Any]:
     """Return an allocation by the field names of ``POST /allocate``, and note how long that took."""
-    begun = time.perf_counter()
+    hurried, begun = limit.hurries(), time.perf_counter()
     explained = explain(problem, plan, limit.hurries)
     found = time.perf_counter()
     answer: dict[str, Any] = to_record(explained)
     answer["assignment"] = answer.pop("plan")["assignment"]
     _answer_time.wrote(problem, time.perf_counter() - found)
-    if not limit.hurries():
+    if hurried:
+        _answer_time.traced(problem, found - begun)
+    elif not limit.hurries():
         _answer_time.explained(problem, found - begun)
     return answer
 

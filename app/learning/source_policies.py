@@ -5,6 +5,7 @@ Workers live long and answer many requests: a process keeps its library open and
 
 from __future__ import annotations
 
+import logging
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from app.domain.errors import InvalidParameters, NoCompatibleSource, Violation
+from app.domain.errors import AllocatorError, InvalidParameters, NoCompatibleSource, Violation
 from app.domain.problem import Problem
 from app.learning.architecture import QMIX_PAPER_1, QmixConfig
 from app.learning.checkpoint import Network, decode
@@ -22,7 +23,7 @@ from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from app.solvers.protocol import SourcePolicy
 from policy_store.database import Database
-from policy_store.errors import PolicyNotFound
+from policy_store.errors import PolicyNotFound, PolicyStoreError
 from policy_store.library import PolicyLibrary
 from policy_store.policy import Policy
 from policy_store.similarity import squared_distances
@@ -35,6 +36,8 @@ _LOOKED_THROUGH = 4 * SHORTLIST
 
 _KEPT = 16
 """Decoded checkpoints a process keeps; a policy for every size takes half a megabyte."""
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +150,20 @@ class SourcePolicies:
         if self._library is None:
             raise _no_source(problem, "there is no library", [])
         return self._library
+
+
+def preload(library_url: str, problem: Problem) -> None:
+    """Open a library and decode its policies for every size, so that no request waits for it.
+
+    As many as a process keeps, with the tasks nearest to a problem. One that cannot be read is passed over
+    here, and fails the requests that choose it.
+    """
+    library = _open(library_url)
+    for near in library.nearest(SUMMARY_SPACE, task_summary(problem), _KEPT, QMIX_UNIVERSAL_1):
+        try:
+            _source(library, near.policy, near.distance)
+        except (AllocatorError, PolicyStoreError):
+            _log.exception("a policy of the library cannot be used", extra={"policy_id": near.policy.id})
 
 
 def _source(library: PolicyLibrary, policy: Policy, distance: float) -> Source:

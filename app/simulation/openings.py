@@ -21,8 +21,12 @@ _PIECE = 300_000
 """Of them, between two looks at the clock."""
 
 
+NONE, NOT_LOOKED = -1, -2
+"""In place of a UAV: there is none; there was no time to look for one."""
+
+
 class Facts(NamedTuple):
-    """About each target, from where the request has the swarm; UAVs are -1 where there is none.
+    """About each target, from where the request has the swarm; UAVs are NONE where there is none.
 
     Attributes
     ----------
@@ -31,8 +35,8 @@ class Facts(NamedTuple):
     fastest, late
         (N,) the UAV among those with the range that arrives first, and how long after the deadline.
     uav, place, guess, short
-        (N,) the best place for one more visit: UAV, number of the visit, guessed change of the reward, and
-        the range that the UAV lacks to keep the rest of its route.
+        (N,) the best place for one more visit: UAV (NOT_LOOKED if nobody looked), number of the visit,
+        guessed change of the reward, and the range that the UAV lacks to keep the rest of its route.
     """
 
     carrier: Integers
@@ -80,12 +84,12 @@ def gather(arrays: ProblemArrays, plan: FlownPlan, urgent: Integers, hurry: Call
     urgent
         Targets with needs left, most urgent first.
     hurry
-        Once it is true, only ends of routes are looked at.
+        Once it is true, no more places are looked at.
     """
     m, n, _ = arrays.shape
     facts = Facts(
-        np.full(n, -1, np.int64), np.full(n, np.inf), np.full(n, -1, np.int64), np.full(n, np.inf),
-        np.full(n, -1, np.int64), np.zeros(n, np.int64), np.full(n, -np.inf), np.zeros(n),
+        np.full(n, NONE, np.int64), np.full(n, np.inf), np.full(n, NONE, np.int64), np.full(n, np.inf),
+        np.full(n, NOT_LOOKED, np.int64), np.zeros(n, np.int64), np.full(n, -np.inf), np.zeros(n),
     )  # fmt: skip
     # What is found does not depend on the order; neighbours in memory are quicker one after the other.
     _look_from_start(arrays, plan.episodes, np.sort(urgent), facts)
@@ -95,16 +99,26 @@ def gather(arrays: ProblemArrays, plan: FlownPlan, urgent: Integers, hurry: Call
     load, later = np.zeros((m, steps + 1, arrays.shape[2])), np.zeros((m, steps + 1))
     _walk(arrays, plan.target, plan.length, plan.delivered, flown, clock, load, later)
     places = int(plan.length.sum()) + m
-    thorough, piece = min(len(urgent), _LOOKS // places), max(1, _PIECE // places)
-    done = 0
-    while done < len(urgent):
-        everywhere = done < thorough and not hurry()
-        end = min(done + piece, thorough) if everywhere else len(urgent)
+    thorough, done = min(len(urgent), _LOOKS // places), 0
+    while done < len(urgent) and not hurry():
+        everywhere = done < thorough
+        piece = max(1, _PIECE // (places if everywhere else m))
+        some = np.sort(urgent[done : min(done + piece, thorough if everywhere else len(urgent))])
         _look_for_place(
-            arrays, plan.episodes, plan.target, plan.length, flown, clock, load, later,
-            np.sort(urgent[done:end]), everywhere, facts,
-        )  # fmt: skip
-        done = end
+            arrays,
+            plan.episodes,
+            plan.target,
+            plan.length,
+            flown,
+            clock,
+            load,
+            later,
+            some,
+            everywhere,
+            facts,
+        )
+        facts.uav[some] = np.maximum(facts.uav[some], NONE)
+        done += len(some)
     return facts
 
 

@@ -17,7 +17,7 @@ from app.domain.problem import Problem
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import Counterfactuals, Outcome
-from app.simulation.openings import Facts, FlownPlan, gather
+from app.simulation.openings import NONE, NOT_LOOKED, Facts, FlownPlan, gather
 
 NO_SUPPLY = "no_supply"
 OUT_OF_RANGE = "out_of_range"
@@ -51,7 +51,7 @@ def unmet_targets(
     reward
         What the plan earns.
     hurry
-        Once it is true, only ends of routes are looked at, and nothing more is flown.
+        Once it is true, nothing more is looked for or flown.
     """
     m, n, _ = arrays.shape
     visiting = actions < n
@@ -131,7 +131,10 @@ class _Judge:
     def _one_more_visit(self, j: int) -> Unmet:
         facts = self._facts
         i, place = int(facts.uav[j]), int(facts.place[j])
-        if i < 0:
+        if i == NOT_LOOKED:
+            says = "a UAV with what it needs could be there in range; no time was left to look further"
+            return self._unmet(j, NOT_CHOSEN, says, int(facts.fastest[j]), None, None)
+        if i == NONE:
             says = "the UAVs that could serve it have used their loads, range or time elsewhere"
             return self._unmet(j, LOADS_USED, says, -1, None, None)
         uav = self._problem.uavs[i].id

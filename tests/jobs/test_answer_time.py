@@ -49,6 +49,17 @@ def test_reasons_get_a_share_of_a_short_time_and_none_of_what_has_passed():
     assert of.kept_back(LARGE, -1.0) == of.way_back(LARGE)
 
 
+def test_what_cannot_be_left_out_of_an_explanation_is_kept_whole():
+    of = AnswerTime()
+    of.wrote(LARGE, 0.01)
+    before = of.way_back(LARGE)
+    of.explained(LARGE, 0.5)
+    of.traced(LARGE, 0.2)
+    assert of.way_back(LARGE) == pytest.approx(before + 0.2)
+    assert of.kept_back(LARGE, 0.1) == pytest.approx(before + 0.2 + 0.025)
+    assert of.kept_back(LARGE, 100.0) == pytest.approx(before + 0.5)
+
+
 def test_an_algorithm_that_would_only_prepare_is_not_begun_and_tried_again_later():
     of = AnswerTime()
     assert not of.is_too_short("ga", LARGE, 0.001)

@@ -128,3 +128,25 @@ def test_of_very_many_the_most_urgent_are_verified(monkeypatch):
     unmet = explain(case, greedy_plan(case)).unmet
     assert {u.verified for u in unmet} == {True, False}
     assert all(u.reward_change is None for u in unmet if not u.verified)
+
+
+@pytest.mark.parametrize("asks", [0, 1, 4])
+def test_in_a_hurry_the_plan_is_told_whole_and_no_reason_claims_what_nobody_looked_at(asks):
+    rng = np.random.default_rng(31)
+    codes = set()
+    for _ in range(30):
+        case = random_problem(rng)
+        plan = greedy_plan(case)
+        whole, asked = explain(case, plan), iter(range(asks))
+        hasty = explain(case, plan, lambda asked=asked: next(asked, None) is None)
+        assert (hasty.routes, hasty.reward) == (whole.routes, whole.reward)
+        for short, long in zip(hasty.unmet, whole.unmet, strict=True):
+            assert (short.target_id, short.remaining) == (long.target_id, long.remaining)
+            if long.code in ("no_supply", "out_of_range", "deadline"):
+                assert (short.code, short.reason) == (long.code, long.reason)
+            elif not short.verified:
+                codes.add(short.code)
+                assert short.remedy is None
+                assert short.code == "not_chosen" or "guessed" in short.reason or "used" in short.reason
+    if asks == 0:
+        assert codes == {"not_chosen"}

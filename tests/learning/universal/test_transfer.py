@@ -7,15 +7,17 @@ import pytest
 import torch
 from problems import random_problem
 from referee import replay
+from sqlalchemy import text
 
 from app.domain.errors import InvalidParameters, NoCompatibleSource, ProblemTooLarge
 from app.domain.records import problem_to_record
 from app.learning.checkpoint import decode, encode, verify
 from app.learning.parameters import QmixParameters, TransferQmixParameters
 from app.learning.qmix import Qmix
-from app.learning.source_policies import SHORTLIST
+from app.learning.source_policies import SHORTLIST, preload
 from app.learning.transfer import TransferQmix
 from app.learning.universal.effort import effort
+from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.rollout import play
 from app.library.entries import new_policy
 from app.library.summary import task_summary
@@ -26,6 +28,7 @@ from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import SolverContext
 from app.solvers.stop import never
 from policy_store.database import Database
+from policy_store.errors import CorruptCheckpoint
 from policy_store.library import PolicyLibrary
 
 BARE = {"n_epochs": 0, "samples": 0, "polish": False}
@@ -236,6 +239,33 @@ def test_what_was_used_comes_back(store):
     assert used.polish_moves == default.polish_moves
     assert solve(store, problem, **SOME).parameters == TransferQmixParameters(**SOME, polish=True)
     assert solve(store, problem, **BARE).parameters == TransferQmixParameters(**BARE, polish_moves=0)
+
+
+def test_a_preloaded_library_is_asked_for_no_weights_and_a_damaged_policy_costs_no_other(
+    tmp_path, policies, caplog
+):
+    problem = generate("uniform", 4, 6, 2, np.random.default_rng(37))
+    database = Database(f"sqlite:///{tmp_path / 'damaged.db'}")
+    library = PolicyLibrary(database)
+    library.migrate()
+    for number, family in enumerate(("uniform", "scarce")):
+        # Weights that no other test has had decoded.
+        policy = UniversalPolicy.of_seed(policies[family].config, 100 + number)
+        task = source_task(family)
+        library.add(new_policy(family, task, checkpoint(policy, task), policy_id=family))
+    with database.write() as connection:
+        damaged = "UPDATE checkpoints SET data = :data WHERE sha256 = :sha256"
+        sha256 = library.get("scarce").checkpoint_sha256
+        connection.execute(text(damaged), {"data": b"not what was stored", "sha256": sha256})
+
+    preload(database.url, problem)
+    assert [record.policy_id for record in caplog.records] == ["scarce"]
+    with database.write() as connection:
+        connection.execute(text("UPDATE checkpoints SET data = :data"), {"data": b"gone"})
+    assert solve(database.url, problem, source="uniform", **BARE).source_policy.id == "uniform"
+    with pytest.raises(CorruptCheckpoint):
+        solve(database.url, problem, source="scarce", **BARE)
+    database.dispose()
 
 
 def test_policy_for_one_size_may_be_asked_for_where_it_fits(store):
