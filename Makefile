@@ -11,7 +11,10 @@ PROCESSES ?= 2
 run: .venv/compiled
 	$(BIN)/python -m app serve --host $(HOST) --port $(PORT)
 
-test: lint types borders unit
+# What looks at the code, beside what compiles it.
+test: .venv/installed
+	$(MAKE) --jobs 2 --output-sync=line lint types borders .venv/compiled
+	$(MAKE) unit
 
 lint: .venv/installed
 	$(BIN)/ruff check .
@@ -50,7 +53,7 @@ constraints:
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
 	touch $@
 
-# One process compiles, so that several workers that start at once do not all do it.
+# Once for all, so that several workers that start at once do not all do it.
 .venv/compiled: .venv/installed $(shell find app -name '*.py')
 	$(BIN)/python -m app compile
 	touch $@

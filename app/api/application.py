@@ -49,7 +49,7 @@ _READ_HEADERS = (
     "X-Request-ID",
 )
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
-_WARM_UP, _WARM_UP_RESERVE = "app.jobs.work:warm_up", "app.jobs.work:warm_up_at_once"
+_WARM_UP, _WARM_UP_RESERVE = "app.jobs.warm_up:warm_up", "app.jobs.warm_up:warm_up_at_once"
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
 

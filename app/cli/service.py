@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -109,12 +110,16 @@ def allocate(
     sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
 
 
-def compile_code() -> None:
+def compile_code(
+    processes: Annotated[
+        int, typer.Option(min=1, help="Processes that compile at a time.", show_default="the cores there are")
+    ] = len(os.sched_getaffinity(0)),
+) -> None:
     """Make and keep the compiled code that the service's workers load; takes minutes the first time."""
-    from app.jobs import work  # noqa: PLC0415 - slow to load
+    from app.jobs.warm_up import compile_all  # noqa: PLC0415 - slow to load
 
     started = time.monotonic()
-    work.warm_up()
+    compile_all(processes)
     typer.echo(f"compiled code is ready ({time.monotonic() - started:.0f} s)", err=True)
 
 

@@ -123,13 +123,14 @@ def test_nothing_is_compiled_after_the_warm_up(library_url):
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
 from app.jobs import work
+from app.jobs.warm_up import warm_up
 from app.jobs.work_context import WorkContext
 
 def compiled():
     found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
     return {f"{each.py_func.__module__}.{each.py_func.__name__}": len(each.overloads) for each in found}
 
-work.warm_up()
+warm_up()
 before = compiled()
 for payload in json.load(sys.stdin):
     work.allocate(payload, WorkContext.in_process(lambda progress: None))

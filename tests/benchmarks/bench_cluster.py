@@ -47,7 +47,7 @@ KINDS = (
     JobKind("allocate", "app.jobs.work:allocate", "batch"),
     JobKind("nothing", "job_work:nothing", "interactive"),
 )
-WARM_UP = "app.jobs.work:warm_up"
+WARM_UP = "app.jobs.warm_up:warm_up"
 ROWS = ("1 worker here", "2 workers here", "1 node", "2 nodes", "2 nodes, 2 services")
 NOTHING_TIMES = 300
 PARAMETERS: dict[str, dict[str, Any]] = {

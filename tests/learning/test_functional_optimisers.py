@@ -46,7 +46,7 @@ def test_weights_are_those_of_torch(ours, theirs, skip_one, seed):
 
 def test_a_warm_worker_has_not_loaded_the_compiler_of_torch():
     asked = (
-        "import sys; from app.jobs.work import warm_up; warm_up(5, 5); "
+        "import sys; from app.jobs.warm_up import warm_up; warm_up(5, 5); "
         "print([name for name in ('torch', 'torch._dynamo', 'sympy') if name in sys.modules])"
     )
     told = subprocess.run(

@@ -1,0 +1,194 @@
+"""What a worker does before it gets work: everything is loaded, compiled and tried, so that nobody waits."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from app.domain.problem import UAV, Problem, Target
+from app.domain.records import problem_to_record
+from app.jobs import bounding, work
+from app.jobs.model import Progress
+from app.jobs.work_context import WorkContext
+from app.jobs.worker import resolve
+from app.simulation.arrays import compile_problem
+from app.simulation.compiled_cache import write_in_turns
+from app.simulation.generator import generate
+from app.solvers import protocol
+from app.solvers.registry import create_solver, parse_parameters
+
+# The learners are named, not imported, so that this room does not depend on them.
+_TRANSFER = "app.learning.universal.warm_up:warm_up"
+_PRELOAD = "app.learning.source_policies:preload"
+
+_LARGEST_TRIED = (1000, 2000)
+"""UAVs and areas of the problem on which the warm-up tries how long answers take, at most."""
+
+_OVERRUNS_TIMED = {
+    **dict.fromkeys(("ga", "local_search", "auto", "exact"), _LARGEST_TRIED),
+    "qmix": (100, 300),
+}
+"""Algorithms whose preparations are timed by the warm-up, and at what size at most."""
+
+_ALONE = protocol.SolverContext()
+
+_PARAMETERS: dict[str, dict[str, Any]] = {
+    "greedy": {},
+    "local_search": {"moves": 200},
+    "dqn": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
+    "exact": {"nodes": 10},
+    "ga": {"num_total": 4, "iteration": 2},
+    # In service mode nothing that the transfer's warm-up leaves out.
+    "qmix": {
+        "mode": "paper",
+        "n_epochs": 4,
+        "evaluate_per_epoch": 2,
+        "buffer_size": 2,
+        "batch_size": 2,
+        "learning_starts": 1,
+    },
+    "auto": {"moves": 200, "policy": False},
+}
+
+
+def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | None = None) -> None:
+    """Load and compile what every kind of job needs, so that nobody waits for it later.
+
+    Parameters
+    ----------
+    most_uavs, most_targets
+        Size of the largest problem that is to be expected; how long answers take is tried on it.
+    library_url
+        Database with the source policies that jobs will ask for.
+    """
+    write_in_turns()
+    for part in _PARTS.values():
+        part()
+    if library_url is not None:
+        resolve(_PRELOAD)(library_url, _small_problem())
+    _time_answers(most_uavs, most_targets)
+    for algorithm, most in _OVERRUNS_TIMED.items():
+        large = _large_problem(min(most_uavs, most[0]), min(most_targets, most[1]))
+        solver = create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE)
+        for _ in range(2):
+            begun = time.perf_counter()
+            solver.solve(large, 0, lambda: True, lambda _progress: None)
+            overrun = time.perf_counter() - begun
+        work.answer_time.overran(algorithm, large, overrun)
+
+
+def compile_all(processes: int) -> None:
+    """Do the same in several processes at a time, for the sake of the compiled code that they keep.
+
+    Parameters
+    ----------
+    processes
+        How many, at least 1.
+    """
+    first, *others = _PARTS
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context, initializer=write_in_turns) as pool:
+        pool.submit(_do, first).result()
+        list(pool.map(_do, others))
+    warm_up()
+
+
+def _do(part: str) -> None:
+    _PARTS[part]()
+
+
+def _algorithm(name: str) -> None:
+    problem = _small_problem()
+    found = work.allocate(_request(problem, name, _PARAMETERS[name]), _unlimited())
+    if found.artifact is not None:
+        work.verify(found.artifact, problem)
+
+
+def _transfer() -> None:
+    resolve(_TRANSFER)(_small_problem())
+
+
+def _bound() -> None:
+    bounding.warm_up(_small_problem())
+
+
+def _unloading() -> None:
+    problem = _small_problem()
+    planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
+    work.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
+
+
+def _geography() -> None:
+    compile_problem(replace(_small_problem(), crs="wgs84"))
+
+
+def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
+    """Load and compile what :func:`app.jobs.work.allocate_at_once` needs; see :func:`warm_up`."""
+    write_in_turns()
+    request = _request(_small_problem(), "greedy", {})
+    work.allocate_at_once({**request, "bound_time_limit_s": 1.0}, _unlimited())
+    _unloading()
+    _geography()
+    _time_answers(most_uavs, most_targets)
+
+
+def _time_answers(most_uavs: int, most_targets: int) -> None:
+    """Know how long answers take here before the first one is asked for in a short time.
+
+    The problem is a large one, so that the memory is there too that such a one takes: the system may need
+    longer to find it than all the work takes that is done in it.
+    """
+    largest = _large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1]))
+    request = _request(largest, "greedy", {})
+    work.allocate_at_once(request, _unlimited())
+    work.answer_time.forget()
+    for _ in range(3):
+        work.allocate_at_once(request, _unlimited())
+        work.allocate_at_once(request, WorkContext.in_process(_untold, time_limit_s=0.0))
+
+
+def _small_problem() -> Problem:
+    # Floats throughout, as requests have them: an array of integers would be compiled for apart.
+    at, home = (1.0, 2.0), (0.0, 0.0)
+    return Problem(
+        uavs=tuple(UAV(f"uav-{i}", *home, *home, 1.0, 10.0, (2.0, 1.0)) for i in (1, 2)),
+        targets=tuple(Target(f"area-{j}", *at, 9.0, (1.0, 2.0), deadline=9.0) for j in (1, 2, 3)),
+        max_steps=2,
+    )
+
+
+def _large_problem(n_uavs: int, n_targets: int) -> Problem:
+    return generate("uniform", n_uavs, n_targets, 3, np.random.default_rng(0))
+
+
+def _request(problem: Problem, algorithm: str, parameters: dict[str, Any]) -> dict[str, Any]:
+    record = problem_to_record(problem)
+    return {
+        "problem": record, "algorithm": algorithm, "parameters": parameters, "seed": 0, "library_url": None
+    }  # fmt: skip
+
+
+def _unlimited() -> WorkContext:
+    return WorkContext.in_process(_untold, time_limit_s=None)
+
+
+def _untold(_progress: Progress) -> None:
+    """Nobody waits for a warm-up's progress."""
+
+
+_PARTS: dict[str, Callable[[], None]] = {
+    "greedy": partial(_algorithm, "greedy"),
+    "transfer": _transfer,
+    "planned unloading": _unloading,
+    **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
+    "bound": _bound,
+    "geography": _geography,
+}
+"""What together loads and compiles all there is: first what the others need too, then what takes longest."""
