@@ -17,6 +17,12 @@ _WATCHFUL = {
     "health_check_failure_threshold": 3,
     "health_check_timeout_ms": 500,
 }
+# As `.deploy/README.md` has it: nodes say once a second how busy they are, and nobody reads metrics.
+_QUIET = {
+    "raylet_report_resources_period_milliseconds": 1000,
+    "enable_metrics_collection": False,
+    "raylet_check_gc_period_milliseconds": 1000,
+}
 
 
 def ray_is_installed() -> bool:
@@ -32,14 +38,20 @@ class RayNodes:
     count
         How many nodes there are at first.
     watchful
-        Whether nodes that were killed are noticed in a second; Ray's own interval costs less.
+        Whether nodes that were killed are noticed in a second; otherwise the cluster is set as
+        ``.deploy/README.md`` sets it.
     """
 
     def __init__(self, count: int, *, watchful: bool = True) -> None:
         self._nodes: list[Any] = []
         from ray.cluster_utils import Cluster  # noqa: PLC0415 - an extra
 
-        head = {"num_cpus": 0, "include_dashboard": False, "_system_config": _WATCHFUL if watchful else {}}
+        head = {
+            "num_cpus": 0,
+            "include_dashboard": False,
+            "include_log_monitor": False,
+            "_system_config": _WATCHFUL if watchful else _QUIET,
+        }
         with _kept_signals():
             self._cluster = Cluster(initialize_head=True, head_node_args=head)
         for _ in range(count):
@@ -53,7 +65,7 @@ class RayNodes:
     def add(self) -> None:
         """Add a node."""
         with _kept_signals():
-            self._nodes.append(self._cluster.add_node(num_cpus=1))
+            self._nodes.append(self._cluster.add_node(num_cpus=1, include_log_monitor=False))
 
     def close(self) -> None:
         """End the cluster."""
