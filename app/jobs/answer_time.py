@@ -18,8 +18,7 @@ _FIXED_S = 0.012
 
 _WHOLE_WAY = 8.0
 """Time of a large answer from its last word to the client's socket, in times of its being written down once:
-it goes through a pipe, is stored, and is written and checked once more. Measured at 1000 x 2000: 5 to 7 on the
-median of an algorithm."""
+it goes through a pipe, is stored, and is written and checked once more. Measured at 1000 x 2000: 5 to 7."""
 
 _EXPLAINING_SHARE = 0.25
 """Of a short time limit, at most, that is kept to look for reasons; those not found by then are left out."""
