@@ -105,7 +105,7 @@ def _units(problem: Problem) -> float:
     The sizes of small problems count for more than they are, so that one that was slow by accident does not
     make all large ones look slow.
     """
-    return max(300.0, _size(problem))
+    return max(400.0, _size(problem))
 
 
 def _magnitude(problem: Problem) -> int:
