@@ -101,7 +101,8 @@ class UnmetModel(AnswerModel):
     code: str = Field(
         description="The reason, for programs: `no_supply` (no UAV carries it), `out_of_range`, `deadline`, "
         "`step_limit`, `range_used` (by the other visits), `loads_used` (on more urgent areas), "
-        "`not_worth_it` (costs more distance than it earns), `not_chosen` (a better plan has been overlooked)"
+        "`not_worth_it` (costs more distance than it earns), `not_chosen` (a better plan has been overlooked "
+        "or, where it is not `verified`, there may be one and no time was left to look)"
     )
     reason: str = Field(description="The reason, for people, with its numbers")
     uav_id: str | None = Field(

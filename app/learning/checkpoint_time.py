@@ -8,8 +8,7 @@ from app.solvers.protocol import StopCriterion
 from app.solvers.stop import seconds_left
 
 _SECONDS_A_BYTE = 3e-8
-"""For coding, the way to the service and its disk; measured with 39 MB: the slowest of ten took
-about a second, and coding and the way 0.3 of it."""
+"""For coding, the way to the service and its disk: with 39 MB the slowest of ten took about a second."""
 
 _LARGEST_SHARE = 0.25
 

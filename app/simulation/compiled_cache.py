@@ -29,6 +29,6 @@ def write_in_turns() -> None:
         # The lock of a process that is killed is free at once.
         with _LOCK.open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            save(self, key, data)  # type: ignore[no-untyped-call]
+            save(self, key, data)  # type: ignore[no-untyped-call]  # untyped in numba
 
-    caching.IndexDataCacheFile.save = in_turn  # type: ignore[method-assign]
+    caching.IndexDataCacheFile.save = in_turn  # type: ignore[method-assign]  # numba has no hook for it
