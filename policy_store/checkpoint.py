@@ -191,7 +191,7 @@ def _no_constant(name: str) -> None:
 
 def _require_text(text: str) -> None:
     """Refuse half of a surrogate pair, which JSON can write but nothing can store or print."""
-    if any("\ud800" <= character <= "\udfff" for character in text):
+    if not text.isascii() and any("\ud800" <= character <= "\udfff" for character in text):
         raise InvalidContainer("its header has text that is not Unicode")
 
 

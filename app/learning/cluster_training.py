@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from app.learning.parameters import QmixParameters
@@ -19,22 +20,14 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def on_cluster(
-    job: Callable[[Item], Result], items: Sequence[Item], address: str
-) -> Iterator[tuple[int, Result]]:
-    """Do a job for every item, each on one core; one that is lost with its machine begins anew on another.
+@contextmanager
+def connected(address: str) -> Iterator[None]:
+    """Work on a cluster meanwhile; of calls within each other the outermost connects and leaves.
 
     Parameters
     ----------
-    job, items
-        Both are sent to other machines, and the result back.
     address
         Of the cluster's head, ``host:port``, or ``"local"`` for one that is started on this machine.
-
-    Yields
-    ------
-    tuple
-        The place of an item and its result, in the order in which they end.
 
     Raises
     ------
@@ -47,30 +40,49 @@ def on_cluster(
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     import ray  # noqa: PLC0415 - an extra
 
-    connected_here = not ray.is_initialized()
-    if connected_here:
-        ray.init(address, log_to_driver=False)
+    if ray.is_initialized():
+        yield
+        return
+    ray.init(address, log_to_driver=False)
     try:
-        # Without end: the cluster may lose as many machines as it likes.
-        environment = {"env_vars": {**_SINGLE_THREADED, **_search_path()}}
-        options: dict[str, Any] = {"num_cpus": 1, "max_retries": -1, "runtime_env": environment}
-        remote: Any = ray.remote(**options)(_call)
-        places = {remote.remote(job, item): place for place, item in enumerate(items)}
-        pending = list(places)
-        while pending:
-            ended, pending = ray.wait(pending)
-            for reference in ended:
-                yield places[reference], ray.get(reference)
+        yield
     finally:
-        if connected_here:
-            ray.shutdown()
+        ray.shutdown()
+
+
+def on_cluster(job: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[tuple[int, Result]]:
+    """Do a job for every item, each on one core; one that is lost with its machine begins anew on another.
+
+    Parameters
+    ----------
+    job, items
+        Both are sent to other machines of the cluster that is :func:`connected`, and the result back.
+
+    Yields
+    ------
+    tuple
+        The place of an item and its result, in the order in which they end.
+    """
+    import ray  # noqa: PLC0415 - an extra
+
+    # Without end: the cluster may lose as many machines as it likes.
+    environment = {"env_vars": {**_SINGLE_THREADED, **_search_path()}}
+    options: dict[str, Any] = {"num_cpus": 1, "max_retries": -1, "runtime_env": environment}
+    remote: Any = ray.remote(**options)(_call)
+    places = {remote.remote(job, item): place for place, item in enumerate(items)}
+    pending = list(places)
+    while pending:
+        ended, pending = ray.wait(pending)
+        for reference in ended:
+            yield places[reference], ray.get(reference)
 
 
 def train_on_cluster(
     trainings: Sequence[tuple[dict[str, Any], QmixParameters]], address: str
 ) -> Iterator[tuple[int, bytes]]:
     """Train source tasks, given as problem records with what to train with; yields as :func:`on_cluster`."""
-    yield from on_cluster(_train, trainings, address)
+    with connected(address):
+        yield from on_cluster(_train, trainings)
 
 
 def _train(training: tuple[dict[str, Any], QmixParameters]) -> bytes:

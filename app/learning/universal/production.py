@@ -11,19 +11,20 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 import torch
 from pydantic import Field
 
 from app.learning.checkpoint import encode
-from app.learning.cluster_training import on_cluster
+from app.learning.cluster_training import connected, on_cluster
 from app.learning.universal.architecture import UniversalConfig
 from app.learning.universal.curriculum import Shard
 from app.learning.universal.demonstrations import Series, demonstrate, read_shard, save_shard, write_shard
@@ -76,6 +77,20 @@ class UniversalTrainingParameters(Parameters):
         return UniversalConfig(self.width, self.layers, self.qmix_hidden_dim)
 
 
+class _Processes(Protocol):
+    """Do a job for every item, in processes here or on a cluster; an item's place and result as they end."""
+
+    def __call__(self, job: Callable[[Item], Path], items: Sequence[Item]) -> Iterator[tuple[int, Path]]: ...
+
+
+def _in_pool(
+    pool: ProcessPoolExecutor, job: Callable[[Item], Path], items: Sequence[Item]
+) -> Iterator[tuple[int, Path]]:
+    places = {pool.submit(job, item): place for place, item in enumerate(items)}
+    for future in as_completed(places):
+        yield places[future], future.result()
+
+
 @dataclass(frozen=True, slots=True)
 class Production:
     """One making of policies.
@@ -115,19 +130,30 @@ class Production:
         self.work.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         p = self.parameters
-        searched = self._shards(replace(SEARCHED, search=p.search), p.shards)
-        general = self._fit("general", searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
-        specialised = self._specialise(general)
-        measured = self._measured()
+        # The same processes for all stages: each loads torch and compiled code before its first job.
+        with self._processes() as processes:
+            searched = self._shards(processes, replace(SEARCHED, search=p.search), p.shards)
+            general = self._fit("general", searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
+            specialised = self._specialise(processes, general)
+            measured = self._measured(processes)
         files = [self._write(folder / f"{name}.safetensors", general, GENERAL, tuple(FAMILIES), measured)]
         for family, state in specialised.items():
             file = folder / f"{name}-{family.replace('_', '-')}.safetensors"
             files.append(self._write(file, state, f"{family}, every size", (family,), measured))
         return files
 
-    def _shards(self, series: Series, count: int) -> list[Path]:
+    @contextmanager
+    def _processes(self) -> Iterator[_Processes]:
+        if self.cluster is not None:
+            with connected(self.cluster):
+                yield on_cluster
+        else:
+            with ProcessPoolExecutor(self.workers, multiprocessing.get_context("spawn")) as pool:
+                yield partial(_in_pool, pool)
+
+    def _shards(self, processes: _Processes, series: Series, count: int) -> list[Path]:
         job = partial(write_shard, self.work, series, self.parameters.seed)
-        return self._in_processes(series.name, job, range(count))
+        return self._all(processes, series.name, job, range(count))
 
     def _fit(self, stage: str, shards: list[Path], schedule: Schedule) -> Path:
         """Fit in this process, with all threads; return the state."""
@@ -141,15 +167,16 @@ class Production:
             torch.set_num_threads(before)
         return state
 
-    def _specialise(self, general: Path) -> dict[str, Path]:
+    def _specialise(self, processes: _Processes, general: Path) -> dict[str, Path]:
         """Fit a copy to each family, families side by side; return the states."""
         job = partial(_specialise, self.work, self.parameters, general)
-        return dict(zip(FAMILIES, self._in_processes("families", job, tuple(FAMILIES)), strict=True))
+        return dict(zip(FAMILIES, self._all(processes, "families", job, tuple(FAMILIES)), strict=True))
 
-    def _measured(self) -> dict[str, Path]:
+    def _measured(self, processes: _Processes) -> dict[str, Path]:
         """Search plans of the fresh problems on which policies are measured."""
         job = partial(_write_measured, self.work, self.parameters)
-        return dict(zip(FAMILIES, self._in_processes("fresh problems", job, tuple(FAMILIES)), strict=True))
+        files = self._all(processes, "fresh problems", job, tuple(FAMILIES))
+        return dict(zip(FAMILIES, files, strict=True))
 
     def _write(
         self, file: Path, state: Path, name: str, families: tuple[str, ...], measured: dict[str, Path]
@@ -176,21 +203,15 @@ class Production:
         self.tell("metrics", 1.0, name)
         return file
 
-    def _in_processes(self, stage: str, job: Callable[[Item], Path], items: Iterable[Item]) -> list[Path]:
-        """Do a job for every item in processes, here or on a cluster; results in the items' order."""
-        if self.cluster is not None:
-            results: dict[int, Path] = {}
-            listed = list(items)
-            for place, path in on_cluster(job, listed, self.cluster):
-                results[place] = path
-                self.tell(stage, len(results) / len(listed), "")
-            return [results[place] for place in range(len(listed))]
-        with ProcessPoolExecutor(self.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-            futures: list[Future[Path]] = [pool.submit(job, item) for item in items]
-            for done, future in enumerate(as_completed(futures)):
-                future.result()
-                self.tell(stage, (done + 1) / len(futures), "")
-            return [future.result() for future in futures]
+    def _all(
+        self, processes: _Processes, stage: str, job: Callable[[Item], Path], items: Sequence[Item]
+    ) -> list[Path]:
+        """Do a job for every item and tell how far that is; results in the items' order."""
+        results: dict[int, Path] = {}
+        for place, path in processes(job, items):
+            results[place] = path
+            self.tell(stage, len(results) / len(items), "")
+        return [results[place] for place in range(len(items))]
 
     def _watch(self, stage: str, schedule: Schedule, update: int, losses: dict[str, float]) -> None:
         words = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
