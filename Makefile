@@ -3,7 +3,7 @@ PORT ?= 8000
 HOST ?= 127.0.0.1
 PYTHON ?= python3
 BIN := .venv/bin
-# Test files at a time.
+# Groups of tests at a time.
 PROCESSES ?= 2
 
 .PHONY: run test lint types borders unit bench constraints clean
@@ -27,7 +27,7 @@ borders: .venv/installed
 	$(BIN)/lint-imports
 
 unit: .venv/compiled
-	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadgroup --no-loadscope-reorder
 
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_simulator.py
@@ -48,9 +48,11 @@ constraints:
 	.venv-constraints/bin/pip freeze --exclude uav-allocator --exclude pip --exclude setuptools | sed 's/+cpu$$//' > constraints.txt
 	rm -rf .venv-constraints
 
+# On all cores; pip would do that on one. What is left out is large, and nobody needs it, or one file of it.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[dev]"
+	$(BIN)/python -m compileall -qq -j 0 -x '/(pymavlink/dialects|tests)/' .venv/lib || true
 	touch $@
 
 # Once for all, so that several workers that start at once do not all do it.

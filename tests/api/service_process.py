@@ -16,6 +16,7 @@ def main() -> None:
     # connection that is kept come 40 ms late.
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.bind(("127.0.0.1", 0))
+    listening.listen()
     print(listening.getsockname()[1], flush=True)
     config = uvicorn.Config(create_application(settings), log_level="warning")
     uvicorn.Server(config).run(sockets=[listening])

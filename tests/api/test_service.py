@@ -83,8 +83,15 @@ def test_restart_keeps_jobs_and_library_and_goes_on_with_what_ran(start_service,
     assert after.stop() in ENDED
 
 
-def test_clean_stop_ends_open_streams(start_service, problem):
-    service = start_service(workers=1).await_ready()
+def test_it_takes_jobs_before_it_is_ready_and_a_clean_stop_ends_open_streams(start_service, problem):
+    service = start_service(workers=1)
+    response = service.client.get("/readyz")
+    assert response.status_code in (200, 503)
+    if response.status_code == 503:
+        assert response.json()["type"] == "not-ready"
+        assert response.headers["retry-after"] == "1"
+    assert service.client.post("/allocate", json={**problem, "algorithm": "greedy"}).status_code == 200
+
     job_id = service.client.post("/allocate", json={**problem, **LONG}, headers=ASYNC).json()["id"]
     with service.client.stream("GET", f"/jobs/{job_id}/events") as stream:
         lines = stream.iter_lines()
@@ -93,21 +100,6 @@ def test_clean_stop_ends_open_streams(start_service, problem):
         for _ in lines:
             pass
     assert service.process.wait(20) in ENDED
-
-
-def test_start_without_workers_yet_is_not_ready_but_takes_jobs(start_service, problem):
-    service = start_service(workers=1)
-    response = None
-    while response is None:
-        response = service.client.get("/readyz")
-    assert response.status_code in (200, 503)
-    if response.status_code == 503:
-        assert response.json()["type"] == "not-ready"
-        assert response.headers["retry-after"] == "1"
-
-    answer = service.client.post("/allocate", json={**problem, "algorithm": "greedy"})
-
-    assert answer.status_code == 200
 
 
 def test_description_is_complete(client):

@@ -118,7 +118,7 @@ def library_url(tmp_path):
     return database.url
 
 
-def test_nothing_is_compiled_after_the_warm_up(library_url):
+def test_after_the_warm_up_nothing_is_compiled_and_the_compiler_of_torch_is_not_even_loaded(library_url):
     program = """
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
@@ -134,7 +134,8 @@ warm_up()
 before = compiled()
 for payload in json.load(sys.stdin):
     work.allocate(payload, WorkContext.in_process(lambda progress: None))
-print(json.dumps([before, compiled()]))
+loaded = [name for name in ("torch", "torch._dynamo", "sympy") if name in sys.modules]
+print(json.dumps([before, compiled(), loaded]))
 """
     problem = problem_from_record(record())
     changed = Problem(
@@ -166,6 +167,7 @@ print(json.dumps([before, compiled()]))
         timeout=240,
     )
 
-    before, after = json.loads(done.stdout)
+    before, after, loaded = json.loads(done.stdout)
     assert before
     assert after == before
+    assert loaded == ["torch"]

@@ -1,16 +1,9 @@
-"""Weights step as torch's own optimisers step them, and a warm worker has not loaded torch's compiler."""
-
-import os
-import subprocess
-import sys
-from pathlib import Path
+"""Weights step as torch's own optimisers step them."""
 
 import pytest
 import torch
 
 from app.learning.functional_optimisers import AdamW, RMSprop
-
-ROOT = Path(__file__).parents[2]
 
 
 def weights_after(make, seed, skip_one):
@@ -42,15 +35,3 @@ def test_weights_are_those_of_torch(ours, theirs, skip_one, seed):
     assert pairs
     for mine, torchs in pairs:
         assert torch.equal(mine, torchs)
-
-
-def test_a_warm_worker_has_not_loaded_the_compiler_of_torch():
-    asked = (
-        "import sys; from app.jobs.warm_up import warm_up; warm_up(5, 5); "
-        "print([name for name in ('torch', 'torch._dynamo', 'sympy') if name in sys.modules])"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", asked],
-        capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    assert told.stdout.strip() == "['torch']"

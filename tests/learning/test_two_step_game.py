@@ -72,7 +72,7 @@ class SumOfAgents(nn.Module):
 def learned_reward(network_of, seed):
     """Reward of the greedy policy after learning from random actions only."""
     parameters = QmixParameters(
-        n_epochs=1500, evaluate_per_epoch=1500, learning_starts=32, lr=2e-3, epsilon_end=1.0,
+        n_epochs=750, evaluate_per_epoch=750, learning_starts=32, lr=2e-3, epsilon_end=1.0,
         update_target_params=50,
     )  # fmt: skip
     streams = random_streams(seed)

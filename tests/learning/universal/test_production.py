@@ -3,6 +3,7 @@
 import torch
 
 from app.learning.checkpoint import decode
+from app.learning.universal import production
 from app.learning.universal.production import Production, UniversalTrainingParameters
 from app.simulation.generator import FAMILIES
 
@@ -16,17 +17,19 @@ PARAMETERS = UniversalTrainingParameters(
     metric_problems=1,
     search=0.01,
 )
+SOME = {name: FAMILIES[name] for name in ("uniform", "single_base", "mid_mission")}
 
 
-def test_a_second_run_finds_everything_done(tmp_path):
+def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
+    monkeypatch.setattr(production, "FAMILIES", SOME)
     told, threads = [], torch.get_num_threads()
     folder, work = tmp_path / "library", tmp_path / "work"
-    production = Production(work, PARAMETERS, 2, lambda stage, share, said: told.append((stage, share)))
-    files = production.run(folder, "all")
+    making = Production(work, PARAMETERS, 2, lambda stage, share, said: told.append((stage, share)))
+    files = making.run(folder, "all")
     first = [file.read_bytes() for file in files]
     changed = {path.name: path.stat().st_mtime_ns for path in work.iterdir()}
 
-    assert production.run(folder, "all") == files
+    assert making.run(folder, "all") == files
 
     assert [file.read_bytes() for file in files] == first
     assert {path.name: path.stat().st_mtime_ns for path in work.iterdir()} == changed
@@ -35,16 +38,16 @@ def test_a_second_run_finds_everything_done(tmp_path):
     assert stages[:5] == ["demonstrations", "general", "families", "fresh problems", "metrics"]
     assert [file.stem for file in files] == [
         "all",
-        *(f"all-{family.replace('_', '-')}" for family in FAMILIES),
+        *(f"all-{family.replace('_', '-')}" for family in SOME),
     ]
     weights = set()
-    for file, families in zip(files, [list(FAMILIES), *([family] for family in FAMILIES)], strict=True):
+    for file, families in zip(files, [list(SOME), *([family] for family in SOME)], strict=True):
         checkpoint = decode(file.read_bytes())
         assert checkpoint.metadata["families"] == families
         ratios = [
             value for name, value in checkpoint.metadata["metrics"].items() if name.startswith("greedy_ratio")
         ]
-        assert len(ratios) == len(FAMILIES)
+        assert len(ratios) == len(SOME)
         assert all(ratio < 1.1 for ratio in ratios)
         weights.add(b"".join(tensor.numpy().tobytes() for tensor in checkpoint.network.state_dict().values()))
     assert len(weights) == len(files)
