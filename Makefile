@@ -3,7 +3,7 @@ PORT ?= 8000
 HOST ?= 127.0.0.1
 PYTHON ?= python3
 BIN := .venv/bin
-# Groups of tests at a time.
+# Groups of test files at a time.
 PROCESSES ?= 2
 
 .PHONY: run test lint types borders unit bench constraints clean
@@ -27,7 +27,7 @@ borders: .venv/installed
 	$(BIN)/lint-imports
 
 unit: .venv/compiled
-	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/bench_simulator.py

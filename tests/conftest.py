@@ -5,6 +5,10 @@ from collections.abc import Iterator
 
 import pytest
 from postgresql_server import PostgresqlServer, binaries
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
+
+ONE_SERVICE = {"tests/api", "tests/dashboard"}
 
 HOW_TO_GET_ONE = (
     "no PostgreSQL: 'apt-get install postgresql' and pip install '.[postgres]' "
@@ -12,12 +16,21 @@ HOW_TO_GET_ONE = (
 )
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep files whose tests share a folder's service in one process, so that it starts once."""
-    sharing = {item.path for item in items if "service" in getattr(item, "fixturenames", ())}
-    for item in items:
-        together = item.path.parent if item.path in sharing else item.path
-        item.add_marker(pytest.mark.xdist_group(str(together.relative_to(item.config.rootpath))))
+class ByService(LoadFileScheduling):
+    """Files are done in one process each, and those of a folder in one whose tests share a service.
+
+    What marks do for xdist's own ``loadgroup`` does nothing with pytest 9.2.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        folder = file.rpartition("/")[0]
+        return folder if folder in ONE_SERVICE else file
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByService:
+    return ByService(config, log)
 
 
 @pytest.fixture(scope="session")
