@@ -19,7 +19,7 @@ HOW_TO_GET_ONE = (
 class ByService(LoadFileScheduling):
     """Files are done in one process each, and those of a folder in one whose tests share a service.
 
-    What marks do for xdist's own ``loadgroup`` does nothing with pytest 9.2.
+    The marks of xdist's own ``loadgroup`` would say that too, but have no effect with pytest 9.2.
     """
 
     def _split_scope(self, nodeid: str) -> str:

@@ -120,7 +120,7 @@ class Learner:
             loss = self.loss(part, played)
             if stop():
                 return False
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()  # type: ignore[no-untyped-call]  # untyped in torch
             self._part_s = time.monotonic() - begun
         norm = nn.utils.clip_grad_norm_(self._parameters, self._grad_norm_clip, foreach=True)
         if torch.isfinite(norm):

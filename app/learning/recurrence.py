@@ -190,5 +190,5 @@ def gru(inputs: Tensor, weight_ih: Tensor, weight_hh: Tensor, bias_ih: Tensor, b
     Tensor
         (T, R, H).
     """
-    hidden: Tensor = _Gru.apply(inputs, weight_ih, weight_hh, bias_ih, bias_hh)  # type: ignore[no-untyped-call]
+    hidden: Tensor = _Gru.apply(inputs, weight_ih, weight_hh, bias_ih, bias_hh)  # type: ignore[no-untyped-call]  # untyped in torch
     return hidden

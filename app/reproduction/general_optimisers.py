@@ -193,7 +193,7 @@ def _pyvrp_routes(
     problem: Problem, arrays: ProblemArrays, model: _Model, seconds: float, seed: int
 ) -> list[list[int]]:
     import pyvrp  # noqa: PLC0415 - an extra
-    from pyvrp.stop import MaxRuntime  # noqa: PLC0415
+    from pyvrp.stop import MaxRuntime  # noqa: PLC0415 - an extra
 
     m, n, _ = arrays.shape
     weight, speeds = float(arrays.weight[0]), arrays.speed[0]

@@ -53,7 +53,7 @@ class Flight(NamedTuple):
 class GeneticAlgorithm:
     """A :class:`~app.solvers.protocol.Solver`; an epoch of its history is a generation."""
 
-    def __init__(self, parameters: GeneticParameters, context: SolverContext) -> None:  # noqa: ARG002
+    def __init__(self, parameters: GeneticParameters, context: SolverContext) -> None:  # noqa: ARG002 - as the protocol has it
         self.parameters = parameters
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:

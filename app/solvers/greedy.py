@@ -20,10 +20,10 @@ _LOOKS = 400_000
 class Greedy:
     """A :class:`~app.solvers.protocol.Solver` without randomness and without search."""
 
-    def __init__(self, parameters: GreedyParameters, context: SolverContext) -> None:  # noqa: ARG002
+    def __init__(self, parameters: GreedyParameters, context: SolverContext) -> None:  # noqa: ARG002 - as the protocol has it
         self.parameters = parameters
 
-    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:  # noqa: ARG002
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:  # noqa: ARG002 - as the protocol has it
         """See :class:`~app.solvers.protocol.Solver`."""
         plan = greedy_plan(problem, stop)
         reward = reward_of(problem, plan)

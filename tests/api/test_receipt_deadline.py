@@ -159,7 +159,7 @@ def test_a_drip_does_not_extend_the_deadline(address):
             except TimeoutError:
                 assert time.monotonic() - begun < PATIENCE_S
     assert b" 408 " in received
-    assert time.monotonic() - begun >= SHORT_S / 2
+    assert time.monotonic() - begun >= 0.9 * SHORT_S  # two clocks
 
 
 def test_a_later_request_of_a_connection_has_the_deadline_too(address):

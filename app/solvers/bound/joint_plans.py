@@ -41,7 +41,7 @@ class JointPlans:
         self._instance, self._sets, self._stop = instance, sets, stop
         self._episodes = new_episodes(instance.arrays, 1)
 
-    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002
+    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002 - as whoever calls it has it
         """Fly all plans of the node; None if there are too many while something is left to ask."""
         arrays, m = self._instance.arrays, len(pools.sets)
         decided = all(len(pool) + int(idle) <= 1 for pool, idle in zip(pools.sets, pools.idle, strict=True))

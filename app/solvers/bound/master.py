@@ -40,7 +40,7 @@ class _Quiet(highspy.Highs):
 
     def enableCallbacks(self) -> None:  # noqa: N802 - HiGHS's name
         self.setOptionValue("output_flag", False)
-        super().enableCallbacks()  # type: ignore[no-untyped-call]
+        super().enableCallbacks()  # type: ignore[no-untyped-call]  # untyped in highspy
 
 
 class Master:
@@ -56,7 +56,7 @@ class Master:
         self._row_of[self._rows] = m + np.arange(len(self._rows))
         self._shape = instance.need.shape
         self._uavs = m
-        self._program = _Quiet()  # type: ignore[no-untyped-call]
+        self._program = _Quiet()  # type: ignore[no-untyped-call]  # untyped in highspy
         for option, value in (
             ("threads", 1),
             ("presolve", "off"),

@@ -54,7 +54,7 @@ class Closing(Protocol):
         ...
 
 
-def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001
+def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001 - as whoever calls it has it
     """Close a node in whose optimum every UAV flies one route: its value is reached by planned unloading."""
     if visits is None or _is_fractional(visits).any():
         return None
