@@ -63,9 +63,9 @@ class Auto:
         """See :class:`~app.solvers.protocol.Solver`."""
         arrays = compile_problem(problem)
         given = self._parameters
-        moves, restarts = how_long(arrays, given.moves, given.restarts, stop)
         search, history = new_search(arrays), History()
         set_routes(search, greedy_plan(problem).as_array())
+        moves, restarts = how_long(search, given.moves, given.restarts, stop)
         left = seconds_left(stop)
         policy = policy_pays(arrays, left) if given.policy is None else given.policy
         source = None

@@ -268,7 +268,7 @@ def test_what_was_used_comes_back():
     used = solve(problem).parameters
     assert (used.moves, used.restarts) == (
         default_moves(arrays),
-        default_restarts(arrays, default_moves(arrays)),
+        default_restarts(arrays, default_moves(arrays), visits=1),
     )
     assert solve(problem, moves=0).history.epoch[0] == 0
     given = LocalSearchParameters(moves=300, restarts=4)

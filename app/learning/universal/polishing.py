@@ -50,5 +50,6 @@ def polish(
         best.consider(actions_of(search)[None])
         watch(done)
 
-    improve(search, rng, moves, default_restarts(arrays, moves) + 1, _COOLING, stop, tell)
+    restarts = default_restarts(arrays, moves, int(search.routes.length.sum()))
+    improve(search, rng, moves, restarts + 1, _COOLING, stop, tell)
     best.consider(actions_of(search)[None])

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.simulation.arrays import Flags, Floats
 from app.solvers.bound.instance import Instance
+from app.solvers.highs import QuietHighs
 
 IDLE = -1
 """Route of a UAV that visits nothing."""
@@ -35,14 +36,6 @@ class MasterSolution(NamedTuple):
     mix: Floats
 
 
-class _Quiet(highspy.Highs):
-    """HiGHS without its banner, which the first of a process prints on standard output as it is built."""
-
-    def enableCallbacks(self) -> None:  # noqa: N802 - HiGHS's name
-        self.setOptionValue("output_flag", False)
-        super().enableCallbacks()  # type: ignore[no-untyped-call]  # untyped in highspy
-
-
 class Master:
     """Columns are routes with what they deliver; rows are the UAVs and the needs.
 
@@ -56,13 +49,7 @@ class Master:
         self._row_of[self._rows] = m + np.arange(len(self._rows))
         self._shape = instance.need.shape
         self._uavs = m
-        self._program = _Quiet()  # type: ignore[no-untyped-call]  # untyped in highspy
-        for option, value in (
-            ("threads", 1),
-            ("presolve", "off"),
-            ("solver", "simplex"),
-        ):
-            self._program.setOptionValue(option, value)
+        self._program = QuietHighs(presolve="off", solver="simplex")
         for _ in range(m):
             self._program.addRow(1.0, 1.0, 0, np.empty(0, np.int32), np.empty(0))
         for _ in self._rows:
@@ -103,16 +90,9 @@ class Master:
         upper = np.where(allowed, highspy.kHighsInf, 0.0)
         self._program.changeColsBounds(count, np.arange(count, dtype=np.int32), np.zeros(count), upper)
 
-    def _run(self) -> None:
-        """Run HiGHS. Its threads are the process's: another user of it may have begun with more of them."""
-        if self._program.run() == highspy.HighsStatus.kError:
-            highspy.Highs.resetGlobalScheduler(True)
-            self._program.run()
-
     def solve(self) -> MasterSolution | None:
         """Solve; None where the columns allow no route to some UAV, or HiGHS finds no optimum."""
-        self._run()
-        if self._program.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+        if not self._program.optimise():
             return None
         solution = self._program.getSolution()
         dual = np.array(solution.row_dual)

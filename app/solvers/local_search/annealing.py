@@ -21,6 +21,7 @@ from app.solvers.local_search.change import (
     undo,
 )
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
+from app.solvers.local_search.pool import Pool, collect, collect_if_promising, new_pool
 from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
 
 
@@ -39,6 +40,8 @@ class Search(NamedTuple):
         (1,) its reward.
     most
         What no plan's satisfaction exceeds.
+    pool
+        Where routes are collected, if they are.
     """
 
     arrays: ProblemArrays
@@ -49,28 +52,29 @@ class Search(NamedTuple):
     best_length: Integers
     best: Floats
     most: float
+    pool: Pool
 
 
 def new_search(arrays: ProblemArrays) -> Search:
-    """Begin a search from the plan in which nobody flies."""
-    return _begin(arrays, neighbourhood(arrays), most_satisfaction(arrays))
+    """Begin a search from the plan in which nobody flies; its pool has no room."""
+    return _begin(arrays, neighbourhood(arrays), most_satisfaction(arrays), new_pool(arrays, 0))
 
 
 def replica(search: Search) -> Search:
     """Begin another search of the same problem from the incumbent of one, for another thread."""
-    other = _begin(search.arrays, search.near, search.most)
+    other = _begin(search.arrays, search.near, search.most, search.pool)
     set_routes(other, actions_of(search))
     return other
 
 
-def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float) -> Search:
+def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float, pool: Pool) -> Search:
     routes = empty_routes(arrays)
     if arrays.charge_return[0]:
         at_home = arrays.start_home[0][~arrays.ret[0]]
         routes.total[DISTANCE] = at_home.sum()
     best = np.array([-arrays.weight[0] * routes.total[DISTANCE]])
     return Search(
-        arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most
+        arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most, pool
     )
 
 
@@ -155,7 +159,7 @@ def drop_useless(search: Search) -> None:
 @compiled_free
 def anneal(
     search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float,
-    haste: float = 0.0, thrift: float = 0.0,
+    haste: float = 0.0, thrift: float = 0.0, collecting: bool = False,
 ) -> int:  # fmt: skip
     """Try moves while the temperature falls geometrically from `hot` to `cold`; return how many were kept.
 
@@ -174,8 +178,10 @@ def anneal(
     haste, thrift
         What a unit of time, and of distance beyond its weight, costs during the search, in reward: room in
         the routes is worth something before anything is put into it.
+    collecting
+        Whether routes that a change leaves behind go to the search's pool.
     """
-    arrays, routes, change = search.arrays, search.routes, search.change
+    arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
     weight = arrays.weight[0]
     kept = 0
     temperature = hot
@@ -184,6 +190,13 @@ def anneal(
         temperature *= cooling
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
+        if collecting:
+            for side in range(2):
+                i = change.uav[side]
+                if i != NONE:
+                    collect_if_promising(
+                        arrays, pool, i, change.target[side], change.length[side], change.flown[side]
+                    )
         extra = extra_distance(arrays, routes, change)
         price = (weight + thrift) * extra + haste * extra_time(routes, change)
         # What the change has to bring to be kept; most bring less, and of many that is known beforehand.
@@ -201,6 +214,11 @@ def anneal(
             kept += 1
             if gain > 0.0:
                 keep_best(search)
+            if collecting:
+                for side in range(2):
+                    i = change.uav[side]
+                    if i != NONE:
+                        collect(arrays, pool, i, routes.target[i], routes.length[i], routes.flown[i])
         else:
             undo(routes, change)
     return kept

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from app.simulation.arrays import ProblemArrays
+from app.solvers.local_search.pool import often_whole
 
 _MOVES_A_VISIT = 40_000
 """Moves for each visit there can be; more find little."""
 
 _ROUND_A_VISIT = 5_000
 """Moves of a round for each visit there can be: cooling faster costs more than another round brings."""
+
+_COMBINED_ROUND = 90
+"""Moves of a round for each pair of visits of a plan, where the routes of all rounds are combined."""
+
+_LEAST_VISITS = 30
+"""Visits, at least, by which such a round is measured."""
 
 _MOST = 4_300_000
 """Bound of the moves times what one costs; about 2 s."""
@@ -41,9 +48,15 @@ def default_moves(arrays: ProblemArrays) -> int:
     return round(min(_MOVES_A_VISIT * _visits(arrays), _MOST / move_cost(arrays)))
 
 
-def default_restarts(arrays: ProblemArrays, moves: int) -> int:
-    """Return in how many rounds more than one the moves are made."""
-    return max(0, moves // (_ROUND_A_VISIT * _visits(arrays)) - 1)
+def default_restarts(arrays: ProblemArrays, moves: int, visits: int) -> int:
+    """Return in how many rounds more than one the moves are made, from a plan with so many visits."""
+    a_round = combined_round(visits) if often_whole(arrays) else _ROUND_A_VISIT * _visits(arrays)
+    return max(0, moves // a_round - 1)
+
+
+def combined_round(visits: int) -> int:
+    """Return the moves of a round where routes of several rounds are combined, of plans of so many visits."""
+    return _COMBINED_ROUND * max(visits, _LEAST_VISITS) ** 2
 
 
 def rounds_for(rounds: int, share: float) -> int:

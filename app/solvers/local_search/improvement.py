@@ -16,6 +16,7 @@ import numpy as np
 
 from app.simulation.arrays import ProblemArrays
 from app.solvers.local_search.annealing import Search, actions_of, anneal, drop_useless, set_routes
+from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
 from app.solvers.stop import seconds_left
@@ -26,6 +27,8 @@ _PIECE_S = 0.002
 _TOLD = 32
 """Times that progress is told, beside the ends of the rounds."""
 
+_COLLECTED_FROM = 0.3
+"""Share of a round after which routes are good enough to be collected."""
 
 _FREE = 0.002
 """Cost of a leg between neighbours, in largest levels, below which distance is as good as free."""
@@ -116,24 +119,26 @@ def improve_together(
     watch
         Told now and then, and after each round.
     """
-    first, stop = searches[0], stops[0]
+    stop = stops[0]
     begin, left = time.monotonic(), seconds_left(stop)
     if left is not None:
-        possible = left * moves_a_second(first.arrays)
+        possible = left * moves_a_second(searches[0].arrays)
         rounds = rounds_for(rounds, possible / max(moves, 1))
+    combination = Combination(searches, rounds, left)
+    searches = combination.searches
+    first = searches[0]
     idle = not (len(first.near.active) and len(first.near.wanted))
+    number, tried = 0, 0
     with ThreadPoolExecutor(max(1, len(searches) - 1)) as threads:
-        for number in range(rounds):
-            if stop():
-                break
-            before, after = moves * number // rounds, moves * (number + 1) // rounds
-            if after > before and not idle:
-                now, end = time.monotonic(), np.inf
+        while number < rounds and not stop():
+            now, end = time.monotonic(), np.inf
+            count = moves * (number + 1) // rounds - tried
+            if count > 0 and not idle:
                 if left is not None:
-                    end = begin + left * (number + 1) / rounds
-                span = _Span(after - before, now, end)
+                    end = now + (begin + left - combination.seconds - now) / (rounds - number)
+                span = _Span(count, now, end)
 
-                def tell(share: float, number: int = number) -> None:
+                def tell(share: float, number: int = number, rounds: int = rounds) -> None:
                     watch((number + share) / rounds, number)
 
                 others = [
@@ -143,8 +148,12 @@ def improve_together(
                 _round(first, generators[0], span, cooling, stop, tell)
                 for other in others:
                     other.result()
+                tried += count
+                if not stop():
+                    rounds = combination.after_round(number + 1, rounds)
                 _share_best(searches)
-            watch((number + 1) / rounds, number + 1)
+            number += 1
+            watch(number / rounds, number)
 
 
 def _round(
@@ -168,7 +177,10 @@ def _round(
     while done < span.moves and share < 1.0 and not stop():
         count = min(piece, span.moves - done)
         hot, cold = (cooling.hot * ratio**part for part in (share, min(share + step, 1.0)))
-        anneal(search, rng, count, hot * scale, cold * scale, cooling.penalty * scale, haste, thrift)
+        anneal(
+            search, rng, count, hot * scale, cold * scale, cooling.penalty * scale, haste, thrift,
+            share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav),
+        )  # fmt: skip
         done += count
         now = span.share(done)
         # The next piece is expected to bring it as far as this one did.

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.arrays import compile_problem
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import Search, actions_of, new_search, replica, set_routes
 from app.solvers.local_search.effort import default_moves, default_restarts, moves_within_limit
@@ -26,9 +26,9 @@ class LocalSearch:
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the greedy rule's plan."""
         arrays = compile_problem(problem)
-        moves, restarts = how_long(arrays, self.parameters.moves, self.parameters.restarts, stop)
         search, history = new_search(arrays), History()
         set_routes(search, greedy_plan(problem).as_array())
+        moves, restarts = how_long(search, self.parameters.moves, self.parameters.restarts, stop)
         history.add(0, float(search.best[0]))
         watch = watching(search, history, report)
         search_on(search, seed, self._context, moves, restarts + 1, stop, watch)
@@ -36,13 +36,14 @@ class LocalSearch:
         return Solution(Plan.of(actions_of(search), problem.n_targets), history, used)
 
 
-def how_long(
-    arrays: ProblemArrays, moves: int | None, restarts: int | None, stop: StopCriterion
-) -> tuple[int, int]:
-    """Fill in the moves and the restarts that a request leaves open."""
+def how_long(search: Search, moves: int | None, restarts: int | None, stop: StopCriterion) -> tuple[int, int]:
+    """Fill in the moves and the restarts that a request leaves open, for a search from its current plan."""
+    arrays = search.arrays
     if moves is None:
         moves = default_moves(arrays) if seconds_left(stop) is None else moves_within_limit(arrays)
-    return moves, default_restarts(arrays, moves) if restarts is None else restarts
+    if restarts is None:
+        restarts = default_restarts(arrays, moves, int(search.routes.length.sum()))
+    return moves, restarts
 
 
 def search_on(
