@@ -23,6 +23,7 @@ from app.simulation.compiled_cache import write_in_turns
 from app.simulation.generator import generate
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
+from app.solvers.stop import never
 
 # The learners are named, not imported, so that this room does not depend on them.
 _TRANSFER = "app.learning.universal.warm_up:warm_up"
@@ -125,6 +126,14 @@ def _unloading() -> None:
     work.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
 
 
+def _combining() -> None:
+    problem = _small_problem()
+    problem = replace(problem, uavs=tuple(replace(u, loadlist=(9.0, 9.0)) for u in problem.uavs))
+    parameters = parse_parameters("local_search", {"moves": 40_000, "restarts": 1})
+    solver = create_solver("local_search", parameters, protocol.SolverContext(threads=2))
+    solver.solve(problem, 0, never, lambda _progress: None)
+
+
 def _geography() -> None:
     compile_problem(replace(_small_problem(), crs="wgs84"))
 
@@ -188,6 +197,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "transfer": _transfer,
     "planned unloading": _unloading,
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
+    "combining": _combining,
     "bound": _bound,
     "geography": _geography,
 }

@@ -4,6 +4,7 @@ import base64
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -154,6 +155,9 @@ print(json.dumps([before, compiled(), loaded]))
     ]
     few = Problem(problem.uavs[:2], problem.targets[:4])
     payloads.append(payload("dqn", QMIX, problem_to_record(few)))
+    plenty = [replace(uav, loadlist=tuple(1000.0 for _ in uav.loadlist)) for uav in problem.uavs]
+    combined = Problem(tuple(plenty), problem.targets)
+    payloads.append(payload("local_search", {"moves": 60_000, "restarts": 2}, problem_to_record(combined)))
     for each in payloads:
         each["library_url"] = library_url
 

@@ -84,7 +84,9 @@ class Combination:
         for search in self.searches:
             search.pool.price[:] = relaxed.price
             search.pool.least[:] = relaxed.least - _SLACK * promised
-        if first.pool.size[0] > CAPACITY // 2:
-            kept = np.zeros(len(relaxed.loss), np.bool_)
-            kept[np.argsort(relaxed.loss, kind="stable")[: CAPACITY // 4]] = True
-            thin(first.pool, kept)
+        size = int(first.pool.size[0])
+        kept = np.zeros(size, np.bool_)
+        kept[np.argsort(relaxed.loss, kind="stable")[: CAPACITY // 4 if size > CAPACITY // 2 else size]] = (
+            True
+        )
+        thin(first.pool, kept)
