@@ -85,8 +85,7 @@ class Combination:
             search.pool.price[:] = relaxed.price
             search.pool.least[:] = relaxed.least - _SLACK * promised
         size = int(first.pool.size[0])
+        room = CAPACITY // 4 if size > CAPACITY // 2 else size
         kept = np.zeros(size, np.bool_)
-        kept[np.argsort(relaxed.loss, kind="stable")[: CAPACITY // 4 if size > CAPACITY // 2 else size]] = (
-            True
-        )
+        kept[np.argsort(relaxed.loss, kind="stable")[:room]] = True
         thin(first.pool, kept)
