@@ -179,7 +179,8 @@ def anneal(
         What a unit of time, and of distance beyond its weight, costs during the search, in reward: room in
         the routes is worth something before anything is put into it.
     collecting
-        Whether routes that a change leaves behind go to the search's pool.
+        Whether routes go to the search's pool: those that a kept change leaves behind, and of those that are
+        only proposed the promising ones.
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
     weight = arrays.weight[0]

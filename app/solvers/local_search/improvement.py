@@ -113,7 +113,8 @@ def improve_together(
         before it were.
     moves, rounds
         How many moves each search tries, over all rounds, at least 1. Where less time is left than they
-        would take, there are fewer rounds in proportion.
+        would take, there are fewer rounds in proportion. Where their routes are combined, which takes some of
+        the time, their number changes with what the first one finds.
     cooling
         Temperatures.
     watch
