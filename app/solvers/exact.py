@@ -8,8 +8,7 @@ from app.simulation.explain import reward_of
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree
-from app.solvers.bound.upper_bound import enumerate_sets
-from app.solvers.bound.visits import visit_bound
+from app.solvers.bound.upper_bound import bound_without_sets, enumerate_sets
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
 from app.solvers.protocol import History, Progress, Proof, Report, Solution, SolverContext, StopCriterion
@@ -43,7 +42,7 @@ class Exact:
         lower = reward / instance.scale
         sets = enumerate_sets(instance, stop)
         if sets is None:
-            bound = max(reward, visit_bound(instance, lower, stop) * instance.scale)
+            bound = max(reward, bound_without_sets(instance, lower, stop) * instance.scale)
             return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
         joint = JointPlans(instance, sets, stop)
         tree = Tree(instance, sets, lower, joint)

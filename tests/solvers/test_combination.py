@@ -5,44 +5,24 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from parcels import parcels
 from referee import replay
 
 from app.domain.plan import Plan
-from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import reward_of
 from app.simulation.generator import FAMILIES, generate
+from app.solvers.column_generation.packing import Packing, next_reward, reachable
+from app.solvers.column_generation.pool import collect, new_pool, often_whole, pour, thin
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.improvement import Cooling, improve
-from app.solvers.local_search.packing import best_choice, next_reward, relax
-from app.solvers.local_search.pool import collect, new_pool, often_whole, pour, thin
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import SolverContext
 from app.solvers.stop import Deadline, never
-
-
-def parcels(
-    rng: np.random.Generator,
-    m: int = 3,
-    n: int = 7,
-    weight: float = 0.0,
-    latest: float = 1.2,
-    charge_return: bool = False,
-) -> Problem:
-    """UAVs of two kinds at one base, each with more than enough for every area it can reach in time."""
-    uavs = tuple(UAV(f"u{i}", 0.5, 0.5, 0.5, 0.5, 1.0 + i % 2, 9.0, (float(n),)) for i in range(m))
-    targets = tuple(
-        Target(
-            f"t{j}", *rng.random(2), float(rng.integers(1, 10)), (1.0,), deadline=latest, service_time=0.05
-        )
-        for j in range(n)
-    )
-    objective = Objective(weight, return_to_base=False, charge_return=charge_return)
-    return Problem(uavs, targets, max_steps=min(n, 5), objective=objective)
 
 
 def collected(problem, seed=1, moves=2000):
@@ -141,6 +121,7 @@ def test_the_next_reward_follows_from_the_steps_of_the_levels(levels, weight, re
     arrays = compile_problem(replace(problem, targets=targets))
     assert next_reward(arrays, reward) == pytest.approx(least, abs=1e-4)
     assert next_reward(arrays, reward) > reward
+    assert reachable(arrays, next_reward(arrays, reward) + 1e-3) == pytest.approx(least, abs=1.1e-3)
 
 
 def best_of_all_choices(arrays, pool):
@@ -173,21 +154,26 @@ def test_the_best_choice_is_that_of_brute_force(seed):
     if pool.size[0] > 40:
         thin(pool, rng.permutation(int(pool.size[0])) < 40)
     best, with_route = best_of_all_choices(arrays, pool)
-    relaxed = relax(arrays, pool)
+    packing = Packing(arrays, pool)
+    relaxed = packing.relax()
     assert relaxed.reward >= best - 1e-9
     assert (with_route <= relaxed.reward - relaxed.loss + 1e-6).all()
     nothing = -1000.0
-    chosen = best_choice(arrays, pool, relaxed, nothing)
+    chosen = packing.choose(relaxed, nothing)
     other = new_search(arrays)
     set_routes(other, chosen)
     drop_useless(other)
     assert other.best[0] >= best - 1e-6
-    assert best_choice(arrays, pool, relaxed, best + 1e-3) is None
+    assert packing.choose(relaxed, best + 1e-3) is None
 
 
-def test_an_empty_pool_has_no_choice():
-    arrays = compile_problem(parcels(np.random.default_rng(7)))
-    assert relax(arrays, new_pool(arrays)) is None
+@pytest.mark.parametrize(("weight", "charge_return"), [(0.0, False), (0.5, True)])
+def test_without_routes_everybody_stays_and_everything_is_worth_its_level(weight, charge_return):
+    problem = parcels(np.random.default_rng(7), weight=weight, charge_return=charge_return)
+    arrays = compile_problem(problem)
+    relaxed = Packing(arrays, new_pool(arrays)).relax()
+    assert relaxed.reward == pytest.approx(float(new_search(arrays).best[0]))
+    np.testing.assert_allclose(relaxed.price, arrays.level[0])
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.3])

@@ -9,6 +9,7 @@ from app.solvers.bound.instance import Instance, new_instance
 from app.solvers.bound.target_sets import MAX_TARGETS, TargetSets, count_sets, sets_of
 from app.solvers.bound.tree import Tree
 from app.solvers.bound.visits import visit_bound
+from app.solvers.bound.whole_routes import route_bound
 from app.solvers.protocol import StopCriterion
 
 MOST_SETS = 500_000
@@ -53,11 +54,27 @@ def upper_bound(problem: Problem, reward: float | None, stop: StopCriterion) -> 
         lower = max(lower, reward / instance.scale)
     sets = enumerate_sets(instance, stop)
     if sets is None:
-        value = max(lower, visit_bound(instance, lower, stop))
+        value = bound_without_sets(instance, lower, stop)
         return UpperBound(value * instance.scale, value <= lower)
     tree = Tree(instance, sets, lower)
     tree.run(stop)
     return UpperBound(tree.bound * instance.scale, tree.proven and tree.attained)
+
+
+def bound_without_sets(instance: Instance, lower: float, stop: StopCriterion) -> float:
+    """Bound the reward of any plan, in the instance's scale, where target sets are too many.
+
+    Parameters
+    ----------
+    instance, lower
+        The problem, and what some plan earns, in the instance's scale.
+    stop
+        As for :func:`upper_bound`.
+    """
+    value = route_bound(instance, lower, stop)
+    if value > lower:
+        value = min(value, visit_bound(instance, lower, stop))
+    return max(lower, value)
 
 
 def enumerate_sets(instance: Instance, stop: StopCriterion) -> tuple[TargetSets, ...] | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_free
+from app.solvers.column_generation.pool import Pool, collect, collect_if_promising, new_pool
 from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (
     Change,
@@ -21,7 +22,6 @@ from app.solvers.local_search.change import (
     undo,
 )
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
-from app.solvers.local_search.pool import Pool, collect, collect_if_promising, new_pool
 from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
 
 

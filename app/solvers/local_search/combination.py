@@ -1,27 +1,37 @@
-"""Combining what a search came across: prices for the routes to be collected, and the best choice of them."""
+"""Combining the routes that a search came across with those that prices ask for, and choosing the best."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from app.simulation.arrays import Integers
+from app.solvers.column_generation.diving import dive
+from app.solvers.column_generation.packing import Packing, Relaxation, next_reward
+from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool, often_whole, pour, thin
+from app.solvers.column_generation.pricing import Pricing
 from app.solvers.local_search.annealing import Search, drop_useless, set_routes
 from app.solvers.local_search.effort import combined_round
-from app.solvers.local_search.packing import best_choice, next_reward, relax
-from app.solvers.local_search.pool import CAPACITY, new_pool, often_whole, pour, thin
 
 _PARTS = 3
-"""Parts of a search at whose ends its routes are combined."""
+"""Parts of a search at whose ends its routes are combined, beside the end of its first round."""
 
-_SHARE, _LEAST_S, _MOST_S = 0.12, 0.06, 1.0
-"""Share of a time limit that one choice may take, and how many seconds it is at least and at most."""
+_FIRST_SHARE, _SHARE = 0.4, 0.15
+"""Share of a time limit that the first combination may take, and that another one may."""
 
-_WORTH_S = 0.2
-"""Seconds from which on there is time for a choice."""
+_LAST_SHARE, _LEAST_S, _MOST_S = 0.12, 0.06, 1.0
+"""Share that is kept for the last one, and how many seconds it is at least and at most."""
 
-_AHEAD = 0.6
-"""Share of its seconds after which HiGHS is told to stop, because it takes longer."""
+_PRICED, _DIVED = 0.5, 0.75
+"""Share of a combination's time after which no more routes are asked for, and after which no dive goes on."""
+
+_OFTEN = 0.3
+"""Share of the time so far up to which routes are combined whenever the pool is half full."""
+
+_WORTH_S = 0.1
+"""Seconds from which on there is time for a combination."""
 
 _SLACK = 0.5
 """Share of what the relaxation promises over the incumbent by which a route may fall short of its price."""
@@ -32,19 +42,23 @@ class Combination:
 
     def __init__(self, searches: Sequence[Search], rounds: int, left: float | None) -> None:
         """Prepare to combine the routes of several rounds, in a part of the seconds left, if it is known."""
+        arrays = searches[0].arrays
         time_enough = left is None or left >= _WORTH_S
-        self._on = rounds > 1 and time_enough and often_whole(searches[0].arrays)
+        self._on = rounds > 1 and time_enough and often_whole(arrays)
+        self._left, self._begin, self._spent = left, time.monotonic(), 0.0
         self.seconds = 0.0
         """How long before the end of the time the last round has to end."""
-        if self._on and left is not None:
-            self.seconds = min(max(_SHARE * left, _LEAST_S), _MOST_S)
-        self._visits = int(searches[0].routes.length.sum())
-        self._limit = None if left is None else _AHEAD * self.seconds
-        self._parts = _PARTS if left is None or left * _SHARE > _LEAST_S else 1
-        self.searches = [
-            search._replace(pool=new_pool(search.arrays)) if self._on else search for search in searches
-        ]
+        self.proven = False
+        """Whether the incumbent is known to be a best plan."""
+        self.searches = list(searches)
         """The searches, with pools."""
+        if self._on:
+            self.searches = [search._replace(pool=new_pool(arrays)) for search in searches]
+            self._visits = int(searches[0].routes.length.sum())
+            self._pricing = Pricing(arrays, self.searches[0].pool)
+            self._always_whole = always_whole(arrays)
+            if left is not None:
+                self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
 
     def after_round(self, ended: int, rounds: int) -> int:
         """Gather the routes after a round; now and then, and after the last one, combine them.
@@ -60,32 +74,66 @@ class Combination:
         first, *others = self.searches
         for search in others:
             pour(search.pool, first.pool)
-        if ended == 1 and self._limit is not None:
+        due = ended in {1, rounds} or ended % max(1, rounds // _PARTS) == 0
+        if due or (first.pool.size[0] > CAPACITY // 2 and self._affordable()):
+            begin = time.monotonic()
+            self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE))
+            self._spent += time.monotonic() - begin
+        if ended == 1 and self._left is not None:
             longer = combined_round(int(first.best_length.sum())) / combined_round(self._visits)
             rounds = 1 + max(1, round((rounds - 1) / max(longer, 1.0)))
-        part = max(1, rounds // self._parts)
-        if ended == rounds or ended % part == 0 or first.pool.size[0] > CAPACITY // 2:
-            self._combine()
         return rounds
 
-    def _combine(self) -> None:
+    def _affordable(self) -> bool:
+        """Whether combinations have taken little of the time so far."""
+        return self._left is None or self._spent <= _OFTEN * (time.monotonic() - self._begin)
+
+    def _until(self, begin: float, share: float) -> float:
+        """Return when a combination has to end that begins now and may take a share of the time limit."""
+        if self._left is None:
+            return np.inf
+        return min(begin + max(share * self._left, self.seconds), self._begin + self._left)
+
+    def _combine(self, begin: float, until: float) -> None:
         """Make the best choice of routes the incumbent, and tell the pools what routes are worth."""
+
+        def passed(share: float) -> Callable[[], bool]:
+            return lambda: time.monotonic() - begin >= share * (until - begin)
+
         first = self.searches[0]
-        relaxed = relax(first.arrays, first.pool)
-        if relaxed is None:
-            return
-        best = max(float(search.best[0]) for search in self.searches)
-        actions = best_choice(first.arrays, first.pool, relaxed, best, self._limit)
-        if actions is not None:
-            set_routes(first, actions)
-            drop_useless(first)
-            best = max(best, float(first.best[0]))
-        promised = max(0.0, relaxed.reward - next_reward(first.arrays, best))
+        packing = Packing(first.arrays, first.pool, until)
+        relaxed = self._pricing.close(packing, self._best(), passed(_PRICED))
+        if relaxed is not None:
+            self._take(dive(packing, self._pricing, relaxed, self._best(), passed(_DIVED)))
+            relaxed = packing.relax()
+        if relaxed is not None:
+            self._take(packing.choose(relaxed, self._best()))
+            self._tell(relaxed)
+        self.proven = self._always_whole and self._pricing.bound < self._next()
+
+    def _tell(self, relaxed: Relaxation) -> None:
+        """Let routes be collected by their prices, and drop those that lose most."""
+        promised = max(0.0, relaxed.reward - self._next())
         for search in self.searches:
             search.pool.price[:] = relaxed.price
             search.pool.least[:] = relaxed.least - _SLACK * promised
-        size = int(first.pool.size[0])
+        pool = self.searches[0].pool
+        size = int(pool.size[0])
         room = CAPACITY // 4 if size > CAPACITY // 2 else size
         kept = np.zeros(size, np.bool_)
         kept[np.argsort(relaxed.loss, kind="stable")[:room]] = True
-        thin(first.pool, kept)
+        thin(pool, kept)
+
+    def _best(self) -> float:
+        """Return what the best plan of all searches earns."""
+        return max(float(search.best[0]) for search in self.searches)
+
+    def _next(self) -> float:
+        """Return what a better one would earn at least."""
+        return next_reward(self.searches[0].arrays, self._best())
+
+    def _take(self, actions: Integers | None) -> None:
+        """Make a choice of routes the current plan, if there is one."""
+        if actions is not None:
+            set_routes(self.searches[0], actions)
+            drop_useless(self.searches[0])

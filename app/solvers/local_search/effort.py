@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.simulation.arrays import ProblemArrays
-from app.solvers.local_search.pool import often_whole
+from app.solvers.column_generation.pool import often_whole
 
 _MOVES_A_VISIT = 40_000
 """Moves for each visit there can be; more find little."""

@@ -131,7 +131,7 @@ def improve_together(
     idle = not (len(first.near.active) and len(first.near.wanted))
     number, tried = 0, 0
     with ThreadPoolExecutor(max(1, len(searches) - 1)) as threads:
-        while number < rounds and not stop():
+        while number < rounds and not combination.proven and not stop():
             now, end = time.monotonic(), np.inf
             count = moves * (number + 1) // rounds - tried
             if count > 0 and not idle:
@@ -154,7 +154,7 @@ def improve_together(
                     rounds = combination.after_round(number + 1, rounds)
                 _share_best(searches)
             number += 1
-            watch(number / rounds, number)
+            watch(1.0 if combination.proven else number / rounds, number)
 
 
 def _round(

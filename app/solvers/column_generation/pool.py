@@ -2,7 +2,7 @@
 
 Kept are whole routes only: those on which a UAV carries enough for all that its targets need. Where the UAVs
 of a plan share no target, each whole route earns the same whatever the others do, so any choice of them can
-be added up (:mod:`app.solvers.local_search.packing`).
+be added up (:mod:`app.solvers.column_generation.packing`).
 """
 
 from __future__ import annotations
@@ -75,6 +75,12 @@ def often_whole(arrays: ProblemArrays) -> bool:
     for k in range(need.shape[1]):
         able &= load[:, k, None] >= need[None, :, k]
     return float(able.mean()) >= _OFTEN_WHOLE
+
+
+def always_whole(arrays: ProblemArrays) -> bool:
+    """Whether every route is whole: each UAV that flies carries enough for all that it can visit."""
+    needs = np.sort(arrays.need[0], axis=0)[::-1][: int(arrays.max_steps[0])].sum(axis=0)
+    return bool((arrays.load[0][~arrays.ret[0]] >= needs[None, :]).all())
 
 
 def new_pool(arrays: ProblemArrays, capacity: int = CAPACITY) -> Pool:

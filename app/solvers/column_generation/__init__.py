@@ -1,0 +1,1 @@
+"""Column generation: the best choice among all routes, where UAVs carry enough for all they visit."""

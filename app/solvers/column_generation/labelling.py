@@ -1,0 +1,365 @@
+"""Routes that are worth most at given prices of the targets: the pricing problem of column generation.
+
+A labelling algorithm. A label is a partial route: its last target, what it is worth, and what it has used of
+each resource that may run out (range, time to the deadlines, loads). A label is dominated by one at the same
+target that is worth as much, has used no more of anything, and may go wherever it may. "May go": visited
+targets are remembered only while the route stays near them, so that labels differ in little (the ng-route
+relaxation of Baldacci, Mingozzi and Roberti, Operations Research 59(5), 2011). A route may come back to a
+target it has forgotten, and seem to be worth more than it is; where that matters, more is remembered
+(:func:`remember`; Roberti and Mingozzi, Transportation Science 48(3), 2014).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.simulator import TOLERANCE, compiled, compiled_free
+from app.solvers.column_generation.pool import Pool, collect
+from app.solvers.local_search.routes import NONE, lay
+
+_MEMORY = 8
+"""Targets whose visits are remembered at a target at first, itself among them."""
+
+_AS_MUCH = 1e-12
+"""Relative difference that does not count when labels are compared: rounding."""
+
+_MOST_MEMORY = 62
+"""Bits for them."""
+
+
+class Ground(NamedTuple):
+    """What routes of all UAVs share.
+
+    Attributes
+    ----------
+    leg
+        (N, N) distances between targets.
+    near, known
+        (N, G) and (N,) the targets whose visits are remembered at a target, itself first, and how many.
+    place
+        (N, N) the place of a target among those of another; NONE where it is forgotten there.
+    """
+
+    leg: Floats
+    near: Integers
+    known: Integers
+    place: npt.NDArray[np.int8]
+
+
+class Means(NamedTuple):
+    """What a UAV has, in R resources that may run out.
+
+    Attributes
+    ----------
+    first
+        (N, R) used after a first visit.
+    rate
+        (R,) used by a unit of distance.
+    amount
+        (N, R) used by a visit.
+    most
+        (N, R) what may have been used after a visit.
+    start, finish
+        (N,) what it costs to begin, and to end, with a target.
+    weight
+        What a unit of distance costs.
+    visits
+        How many visits there may be.
+    nothing
+        A difference in worth that is only rounding.
+    """
+
+    first: Floats
+    rate: Floats
+    amount: Floats
+    most: Floats
+    start: Floats
+    finish: Floats
+    weight: float
+    visits: int
+    nothing: float
+
+
+class Labels(NamedTuple):
+    """Room for L labels, in the order in which they were found.
+
+    Attributes
+    ----------
+    last, visits, parent
+        (L,) last target, number of visits, and the label that it extends; NONE for a first visit.
+    memory
+        (L,) which of the targets near the last one were visited, as bits.
+    value
+        (L,) prices of the visits less the cost of the distance.
+    used
+        (L, R) resources.
+    alive
+        (L,) whether it is not dominated.
+    first, following
+        (N,) and (L,): the labels at each target that are not dominated, as linked lists.
+    size, extended
+        (1,) how many there are, and how many of them were extended.
+    """
+
+    last: Integers
+    visits: Integers
+    parent: Integers
+    memory: Integers
+    value: Floats
+    used: Floats
+    alive: Flags
+    first: Integers
+    following: Integers
+    size: Integers
+    extended: Integers
+
+
+def ground_of(arrays: ProblemArrays) -> Ground:
+    """Measure the ground of the first problem of a stack."""
+    n = arrays.level.shape[1]
+    leg = np.ascontiguousarray(arrays.between[0])
+    size = min(_MEMORY, n)
+    near = np.zeros((n, min(_MOST_MEMORY, n)), np.int64)
+    apart = leg + np.where(np.eye(n, dtype=bool), -np.inf, 0.0)
+    near[:, :size] = np.argsort(apart, axis=1, kind="stable")[:, :size]
+    place = np.full((n, n), NONE, np.int8)
+    place[near[:, :size], np.arange(n)[:, None]] = np.arange(size)[None, :]
+    return Ground(leg, near, np.full(n, size), place)
+
+
+def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Means:
+    """Write down what UAV `i` has, leaving out what cannot run out; limits may be exceeded by a tolerance."""
+    speed, visits = float(arrays.speed[0, i]), min(int(arrays.max_steps[0]), arrays.level.shape[1])
+    start, home, service = arrays.start_target[0, i], arrays.home[0, i], arrays.service[0]
+    latest = arrays.deadline[0] + np.abs(arrays.deadline[0]) * tolerance
+    reach = np.broadcast_to(arrays.voyage[0, i] * (1.0 + tolerance), start.shape) - arrays.dis[0, i]
+    if arrays.return_to_base[0]:
+        reach = reach - home
+    rows = []
+    # Time is flown at this speed at least, so who is never late flies no farther than that.
+    if reach.min(initial=np.inf) < speed * latest.max(initial=0.0):
+        rows.append((start, 1.0, np.zeros_like(start), reach))
+    if np.isfinite(latest).any():
+        rows.append((start / speed + service, 1.0 / speed, service, latest + service))
+    for need, load in zip(arrays.need[0].T, arrays.load[0, i], strict=True):
+        if np.sort(need)[::-1][:visits].sum() > load:
+            rows.append((need, 0.0, need, np.broadcast_to(load * (1.0 + tolerance), need.shape)))
+    weight, nothing = float(arrays.weight[0]), _AS_MUCH * float(arrays.level[0].max(initial=0.0))
+    charged = weight if arrays.charge_return[0] else 0.0
+    columns = [np.column_stack([row[at] for row in rows] or [np.empty((len(start), 0))]) for at in (0, 2, 3)]
+    first, amount, most = (np.ascontiguousarray(column, np.float64) for column in columns)
+    rate = np.array([row[1] for row in rows], np.float64)
+    return Means(first, rate, amount, most, weight * start, charged * home, weight, visits, nothing)
+
+
+def new_labels(targets: int, resources: int, room: int) -> Labels:
+    """Make room for labels."""
+    return Labels(
+        last=np.empty(room, np.int64),
+        visits=np.empty(room, np.int64),
+        parent=np.empty(room, np.int64),
+        memory=np.empty(room, np.int64),
+        value=np.empty(room),
+        used=np.empty((room, resources)),
+        alive=np.empty(room, np.bool_),
+        first=np.empty(targets, np.int64),
+        following=np.empty(room, np.int64),
+        size=np.zeros(1, np.int64),
+        extended=np.zeros(1, np.int64),
+    )
+
+
+@compiled_free
+def begin(ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool) -> None:
+    """Begin anew, with the first visits; see :func:`extend`."""
+    labels.size[0], labels.extended[0] = 0, 0
+    for j in range(price.shape[0]):
+        labels.first[j] = NONE
+    for j in range(price.shape[0]):
+        if price[j] > 0.0:
+            _visit(ground, means, price, labels, NONE, j, exact)
+
+
+@compiled_free
+def extend(ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool, count: int) -> bool:
+    """Extend the next `count` labels in every way; whether there are more, and room for them.
+
+    Parameters
+    ----------
+    ground, means
+        The problem, and what the UAV has.
+    price
+        (N,) what a visit is worth; none is made that is worth nothing.
+    labels
+        Changed.
+    exact
+        Whether what may still be visited counts when labels are compared. Otherwise there are far fewer, and
+        the best route may be missed.
+    count
+        Those that are dominated count, too.
+    """
+    last = min(labels.extended[0] + count, labels.size[0])
+    while labels.extended[0] < last:
+        q = labels.extended[0]
+        if labels.alive[q] and labels.visits[q] < means.visits:
+            i = labels.last[q]
+            for j in range(price.shape[0]):
+                seen = ground.place[j, i]
+                if price[j] <= 0.0 or (seen != NONE and labels.memory[q] >> seen & 1):
+                    continue
+                if not _visit(ground, means, price, labels, q, j, exact):
+                    return False
+        labels.extended[0] = q + 1
+    return labels.extended[0] < labels.size[0]
+
+
+@compiled
+def _visit(
+    ground: Ground, means: Means, price: Floats, labels: Labels, parent: int, j: int, exact: bool
+) -> bool:
+    """Extend a label by a visit, if that is possible and not dominated; False where there is no room."""
+    q = labels.size[0]
+    if q == labels.last.shape[0]:
+        return False
+    resources = means.rate.shape[0]
+    if parent == NONE:
+        for r in range(resources):
+            labels.used[q, r] = means.first[j, r]
+            if labels.used[q, r] > means.most[j, r]:
+                return True
+        labels.value[q] = price[j] - means.start[j]
+        labels.memory[q] = 1
+        labels.visits[q] = 1
+    else:
+        i = labels.last[parent]
+        leg = ground.leg[i, j]
+        for r in range(resources):
+            labels.used[q, r] = labels.used[parent, r] + leg * means.rate[r] + means.amount[j, r]
+            if labels.used[q, r] > means.most[j, r]:
+                return True
+        labels.value[q] = labels.value[parent] + price[j] - means.weight * leg
+        memory = 1
+        for bit in range(ground.known[i]):
+            if labels.memory[parent] >> bit & 1:
+                kept = ground.place[ground.near[i, bit], j]
+                if kept != NONE:
+                    memory |= 1 << kept
+        labels.memory[q] = memory
+        labels.visits[q] = labels.visits[parent] + 1
+    if _dominated(means, labels, q, j, exact):
+        return True
+    labels.last[q], labels.parent[q], labels.alive[q] = j, parent, True
+    labels.following[q], labels.first[j] = labels.first[j], q
+    labels.size[0] = q + 1
+    return True
+
+
+@compiled
+def _dominated(means: Means, labels: Labels, q: int, j: int, exact: bool) -> bool:
+    """Whether a label at target `j` that is not listed yet is dominated; delists those that it dominates."""
+    before, other = NONE, labels.first[j]
+    # Labels come in the order of their visits, so an earlier one has no more of them.
+    free = means.visits == labels.first.shape[0]
+    while other != NONE:
+        after = labels.following[other]
+        better = labels.value[other] >= labels.value[q] - means.nothing
+        worse = labels.value[other] <= labels.value[q] and (free or labels.visits[other] == labels.visits[q])
+        if exact:
+            better = better and labels.memory[other] & ~labels.memory[q] == 0
+            worse = worse and labels.memory[q] & ~labels.memory[other] == 0
+        for r in range(means.rate.shape[0]):
+            better = better and labels.used[other, r] <= labels.used[q, r] * (1.0 + _AS_MUCH)
+            worse = worse and labels.used[other, r] >= labels.used[q, r]
+        if better:
+            return True
+        if worse:
+            labels.alive[other] = False
+            if before == NONE:
+                labels.first[j] = after
+            else:
+                labels.following[before] = after
+        else:
+            before = other
+        other = after
+    return False
+
+
+def values(means: Means, labels: Labels) -> Floats:
+    """Return what the labels are worth as whole routes, (size,)."""
+    size = int(labels.size[0])
+    return labels.value[:size] - means.finish[labels.last[:size]]
+
+
+@compiled_free
+def remember(ground: Ground, labels: Labels, chosen: Integers) -> int:
+    """Let visits be remembered that some labels forgot and made twice; return how many more there are.
+
+    Between the two visits every target remembers the first one, as far as there are bits.
+    """
+    more = 0
+    for at in range(chosen.shape[0]):
+        later = chosen[at]
+        while later != NONE:
+            earlier = labels.parent[later]
+            while earlier != NONE and labels.last[earlier] != labels.last[later]:
+                earlier = labels.parent[earlier]
+            if earlier != NONE:
+                between, j = labels.parent[later], labels.last[later]
+                while between != earlier:
+                    i = labels.last[between]
+                    if ground.place[j, i] == NONE and ground.known[i] < ground.near.shape[1]:
+                        ground.near[i, ground.known[i]], ground.place[j, i] = j, ground.known[i]
+                        ground.known[i] += 1
+                        more += 1
+                    between = labels.parent[between]
+            later = labels.parent[later]
+    return more
+
+
+@compiled_free
+def collect_labels(
+    arrays: ProblemArrays,
+    pool: Pool,
+    i: int,
+    labels: Labels,
+    chosen: Integers,
+    targets: Integers,
+    flown: Floats,
+    clock: Floats,
+) -> None:
+    """Put the routes of some labels into a pool, each target once.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    pool
+        Changed.
+    i
+        The UAV that the labels are of.
+    labels, chosen
+        Labels, and (C,) which of them.
+    targets, flown, clock
+        (S,), (S+1,) and (S+1,) scratch space.
+    """
+    for at in range(chosen.shape[0]):
+        q = chosen[at]
+        length = labels.visits[q]
+        for s in range(length - 1, -1, -1):
+            targets[s] = labels.last[q]
+            q = labels.parent[q]
+        kept = 0
+        for s in range(length):
+            again = False
+            for earlier in range(kept):
+                again = again or targets[earlier] == targets[s]
+            if not again:
+                targets[kept] = targets[s]
+                kept += 1
+        flown[0], clock[0] = arrays.dis[0, i], 0.0
+        if lay(arrays, i, targets, kept, 0, flown, clock):
+            collect(arrays, pool, i, targets, kept, flown)

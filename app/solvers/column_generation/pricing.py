@@ -1,0 +1,191 @@
+"""Column generation: routes that the relaxation's prices ask for, until no route is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import TOLERANCE
+from app.solvers.column_generation.labelling import (
+    Labels,
+    Means,
+    begin,
+    collect_labels,
+    extend,
+    ground_of,
+    means_of,
+    new_labels,
+    remember,
+    values,
+)
+from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost
+from app.solvers.column_generation.pool import Pool
+
+_ROOM = 60_000
+"""Labels of one UAV in a search."""
+
+_PIECE = 1_000
+"""Labels extended between two looks at the clock: some milliseconds."""
+
+_EFFORT = 300_000
+"""Labels in a combination of a search, whatever the time."""
+
+_BATCH = 60
+"""Routes of a kind of UAV that are taken at a time."""
+
+_CYCLES = 20
+"""Labels of a kind of UAV, at most, of whose forgotten visits more are remembered at a time."""
+
+_GAIN = 1e-7
+"""What a route must be worth over what it has to, in largest levels, to change the relaxation."""
+
+
+class _Turn(NamedTuple):
+    """What came of asking for routes once: labels made, whether routes or memories were added."""
+
+    labels: int
+    grew: bool
+    remembered: bool
+
+
+class Pricing:
+    """The routes of each kind of UAV that flies, at prices that change until no route is missing."""
+
+    def __init__(
+        self,
+        arrays: ProblemArrays,
+        pool: Pool,
+        *,
+        room: int = _ROOM,
+        effort: float = _EFFORT,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Prepare to add routes to a pool.
+
+        Parameters
+        ----------
+        arrays
+            A stack of one problem.
+        pool
+            Its pool.
+        room
+            Labels that there is room for, for one UAV.
+        effort
+            Labels after which no more routes are asked for at a time.
+        tolerance
+            By what share of a limit it may be exceeded. More than the simulator's leaves room for rounding in
+            the bound; routes that need it are not added.
+        """
+        n, steps = arrays.level.shape[1], int(arrays.max_steps[0])
+        self._arrays, self._pool, self._ground = arrays, pool, ground_of(arrays)
+        kinds, number = np.unique(pool.kind[~arrays.ret[0]], return_counts=True)
+        self._kinds = [
+            (i, many, means_of(arrays, i, tolerance))
+            for i, many in zip(kinds.tolist(), number.tolist(), strict=True)
+        ]
+        resources = {len(means.rate) for _, _, means in self._kinds}
+        self._labels = {size: new_labels(n, size, room) for size in resources}
+        self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
+        self._gain = _GAIN * float(arrays.level[0].max(initial=0.0))
+        self._idle, self._effort = idle_cost(arrays), effort
+        self.bound = np.inf
+        """What no choice of whole routes exceeds, whether they are in the pool or not."""
+
+    def close(
+        self, packing: Packing, best: float, ended: Callable[[], bool], thorough: bool = True
+    ) -> Relaxation | None:
+        """Add routes to the pool until its relaxation is that of all routes.
+
+        Parameters
+        ----------
+        packing
+            Of the pool.
+        best
+            What the best plan earns that is known; routes that no better one can use are not added.
+        ended
+            Asked every few milliseconds; when true, the relaxation is that of the routes so far.
+        thorough
+            Whether to find every route that is missing, or those that are found at once.
+
+        Returns
+        -------
+        Relaxation or None
+            None where there are no routes.
+        """
+        exact, effort = False, 0
+        relaxed = packing.relax()
+        while relaxed is not None and effort < self._effort and not ended():
+            promised = max(0.0, relaxed.reward - packing.better_than(best))
+            turn = self._ask(packing, relaxed, promised, exact, ended)
+            effort += turn.labels
+            if turn.grew:
+                relaxed, exact = packing.relax(), False
+            elif not thorough:
+                break
+            elif not exact:
+                exact = True
+            elif not turn.remembered:
+                break
+        return relaxed
+
+    def _ask(
+        self,
+        packing: Packing,
+        relaxed: Relaxation,
+        promised: float,
+        exact: bool,
+        ended: Callable[[], bool],
+    ) -> _Turn:
+        """Ask for routes at the prices of a relaxation, and bound what any choice of routes earns."""
+        made, grew, remembered, complete = 0, False, False, exact and not packing.fixed
+        spare = packing.spare()
+        bound = float(np.maximum(0.0, self._arrays.level[0] - relaxed.price).sum())
+        for asked, (i, many, means) in enumerate(self._kinds, start=1):
+            if not spare[i]:
+                continue
+            labels = self._labels[len(means.rate)]
+            complete &= self._label(means, relaxed.price, labels, exact, ended)
+            made += int(labels.size[0])
+            worth, least = values(means, labels), relaxed.least[i]
+            bound += many * max(worth.max(initial=-np.inf), -self._idle[i])
+            before = self._known()
+            good = _most(worth, least - promised, _BATCH)
+            collect_labels(self._arrays, self._pool, i, labels, good, *self._scratch)
+            if self._known() != before:
+                grew = True
+            elif exact:
+                cycles = _most(worth, least + self._gain, _CYCLES)
+                remembered |= remember(self._ground, labels, cycles) > 0
+            if ended():
+                # The others come first next time.
+                self._kinds = self._kinds[asked:] + self._kinds[:asked]
+                return _Turn(made, grew, remembered)
+        if complete:
+            self.bound = min(self.bound, bound)
+        return _Turn(made, grew, remembered)
+
+    def _label(
+        self, means: Means, price: Floats, labels: Labels, exact: bool, ended: Callable[[], bool]
+    ) -> bool:
+        """Make the labels of a UAV; whether they are all there are."""
+        begin(self._ground, means, price, labels, exact)
+        while labels.extended[0] < labels.size[0]:
+            if ended() or not extend(self._ground, means, price, labels, exact, _PIECE):
+                break
+        return bool(labels.extended[0] == labels.size[0])
+
+    def _known(self) -> tuple[int, float]:
+        """Number and length of all routes, one of which changes when a route is added or replaced."""
+        size = int(self._pool.size[0])
+        return size, float(self._pool.distance[:size].sum())
+
+
+def _most(worth: Floats, least: float, count: int) -> Integers:
+    """Return the labels worth more than the least, at most so many, in the order in which they were found."""
+    good = np.flatnonzero(worth > least)
+    if len(good) > count:
+        good = good[np.argpartition(-worth[good], count)[:count]]
+    return np.sort(good)
