@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.simulation.arrays import Integers
+from app.simulation.arrays import Floats, Integers
 from app.solvers.column_generation.packing import Packing, Relaxation
 from app.solvers.column_generation.pricing import Pricing
 
@@ -23,6 +23,7 @@ def dive(
     relaxed: Relaxation,
     best: float,
     ended: Callable[[], bool],
+    rng: np.random.Generator | None = None,
 ) -> Integers | None:
     """Round a relaxation to a choice of routes.
 
@@ -36,6 +37,8 @@ def dive(
         What the choice has to exceed.
     ended
         Asked every few milliseconds; when true, there is no choice.
+    rng
+        Draws the routes to fix by their shares; None: it is always the largest.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def dive(
                 return packing.actions(np.array([*packing.fixed, *used.tolist()], np.int64))
             favourites = np.flatnonzero(unfixed >= _CERTAIN)
             if not len(favourites) or not packing.room_for(favourites):
-                favourites = np.array([unfixed.argmax()])
+                favourites = _favourite(unfixed, rng)
             packing.fix(favourites.tolist())
             following = pricing.close(packing, best, ended, thorough=False)
             if following is None or ended():
@@ -60,3 +63,11 @@ def dive(
         return None
     finally:
         packing.loosen()
+
+
+def _favourite(share: Floats, rng: np.random.Generator | None) -> Integers:
+    """(1,) the route of the largest share, or one drawn, the larger its share the likelier."""
+    if rng is None:
+        return np.array([share.argmax()])
+    weight = share * share
+    return rng.choice(len(share), 1, p=weight / weight.sum())

@@ -40,6 +40,8 @@ class Ground(NamedTuple):
         (N, N) distances between targets.
     near, known
         (N, G) and (N,) the targets whose visits are remembered at a target, itself first, and how many.
+    order
+        (N, N) all targets, nearest first.
     place
         (N, N) the place of a target among those of another; NONE where it is forgotten there.
     """
@@ -47,6 +49,7 @@ class Ground(NamedTuple):
     leg: Floats
     near: Integers
     known: Integers
+    order: Integers
     place: npt.NDArray[np.int8]
 
 
@@ -63,6 +66,8 @@ class Means(NamedTuple):
         (N, R) used by a visit.
     most
         (N, R) what may have been used after a visit.
+    farthest
+        (R,) what may have been used before a visit, at whichever target.
     start, finish
         (N,) what it costs to begin, and to end, with a target.
     weight
@@ -77,6 +82,7 @@ class Means(NamedTuple):
     rate: Floats
     amount: Floats
     most: Floats
+    farthest: Floats
     start: Floats
     finish: Floats
     weight: float
@@ -125,10 +131,11 @@ def ground_of(arrays: ProblemArrays) -> Ground:
     size = min(_MEMORY, n)
     near = np.zeros((n, min(_MOST_MEMORY, n)), np.int64)
     apart = leg + np.where(np.eye(n, dtype=bool), -np.inf, 0.0)
-    near[:, :size] = np.argsort(apart, axis=1, kind="stable")[:, :size]
+    order = np.argsort(apart, axis=1, kind="stable")
+    near[:, :size] = order[:, :size]
     place = np.full((n, n), NONE, np.int8)
     place[near[:, :size], np.arange(n)[:, None]] = np.arange(size)[None, :]
-    return Ground(leg, near, np.full(n, size), place)
+    return Ground(leg, near, np.full(n, size), order, place)
 
 
 def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Means:
@@ -153,7 +160,8 @@ def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Mea
     columns = [np.column_stack([row[at] for row in rows] or [np.empty((len(start), 0))]) for at in (0, 2, 3)]
     first, amount, most = (np.ascontiguousarray(column, np.float64) for column in columns)
     rate = np.array([row[1] for row in rows], np.float64)
-    return Means(first, rate, amount, most, weight * start, charged * home, weight, visits, nothing)
+    farthest = (most - amount).max(axis=0, initial=-np.inf)
+    return Means(first, rate, amount, most, farthest, weight * start, charged * home, weight, visits, nothing)
 
 
 def new_labels(targets: int, resources: int, room: int) -> Labels:
@@ -207,7 +215,10 @@ def extend(ground: Ground, means: Means, price: Floats, labels: Labels, exact: b
         q = labels.extended[0]
         if labels.alive[q] and labels.visits[q] < means.visits:
             i = labels.last[q]
-            for j in range(price.shape[0]):
+            for nth in range(price.shape[0]):
+                j = ground.order[i, nth]
+                if _too_far(means, labels, q, ground.leg[i, j]):
+                    break
                 seen = ground.place[j, i]
                 if price[j] <= 0.0 or (seen != NONE and labels.memory[q] >> seen & 1):
                     continue
@@ -215,6 +226,15 @@ def extend(ground: Ground, means: Means, price: Floats, labels: Labels, exact: b
                     return False
         labels.extended[0] = q + 1
     return labels.extended[0] < labels.size[0]
+
+
+@compiled
+def _too_far(means: Means, labels: Labels, q: int, leg: float) -> bool:
+    """Whether a leg uses up so much that there is no target it may lead to."""
+    for r in range(means.rate.shape[0]):
+        if labels.used[q, r] + leg * means.rate[r] > means.farthest[r]:
+            return True
+    return False
 
 
 @compiled

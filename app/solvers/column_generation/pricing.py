@@ -24,13 +24,13 @@ from app.solvers.column_generation.labelling import (
 from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost
 from app.solvers.column_generation.pool import Pool
 
-_ROOM = 60_000
+_ROOM = 40_000
 """Labels of one UAV in a search."""
 
 _PIECE = 1_000
 """Labels extended between two looks at the clock: some milliseconds."""
 
-_EFFORT = 300_000
+_EFFORT = 100_000
 """Labels in a combination of a search, whatever the time."""
 
 _BATCH = 60
@@ -123,7 +123,7 @@ class Pricing:
             effort += turn.labels
             if turn.grew:
                 relaxed, exact = packing.relax(), False
-            elif not thorough:
+            elif not thorough or self.bound <= relaxed.reward + self._gain:
                 break
             elif not exact:
                 exact = True

@@ -15,8 +15,9 @@ from app.solvers.column_generation.pricing import Pricing
 from app.solvers.local_search.annealing import Search, drop_useless, set_routes
 from app.solvers.local_search.effort import combined_round
 
-_PARTS = 3
-"""Parts of a search at whose ends its routes are combined, beside the end of its first round."""
+_PARTS, _PARTS_UNLIMITED = 3, 1
+"""Parts of a search at whose ends its routes are combined, beside the end of its first round; the second
+where no time limit keeps that short."""
 
 _FIRST_SHARE, _SHARE = 0.4, 0.15
 """Share of a time limit that the first combination may take, and that another one may."""
@@ -24,11 +25,17 @@ _FIRST_SHARE, _SHARE = 0.4, 0.15
 _LAST_SHARE, _LEAST_S, _MOST_S = 0.12, 0.06, 1.0
 """Share that is kept for the last one, and how many seconds it is at least and at most."""
 
-_PRICED, _DIVED = 0.5, 0.75
-"""Share of a combination's time after which no more routes are asked for, and after which no dive goes on."""
+_PRICED, _DIVED, _DIVED_ON = 0.5, 0.75, 0.9
+"""Shares of a combination's time after which asking for routes, the first dive and the others end."""
+
+_DIVES, _DIVES_UNLIMITED = 8, 3
+"""Further dives, at most, once routes are chosen; likewise."""
 
 _OFTEN = 0.3
 """Share of the time so far up to which routes are combined whenever the pool is half full."""
+
+_SEED = 20220816
+"""Of the random numbers of dives."""
 
 _WORTH_S = 0.1
 """Seconds from which on there is time for a combination."""
@@ -56,6 +63,7 @@ class Combination:
             self.searches = [search._replace(pool=new_pool(arrays)) for search in searches]
             self._visits = int(searches[0].routes.length.sum())
             self._pricing = Pricing(arrays, self.searches[0].pool)
+            self._rng = np.random.default_rng(_SEED)
             self._always_whole = always_whole(arrays)
             if left is not None:
                 self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
@@ -74,7 +82,8 @@ class Combination:
         first, *others = self.searches
         for search in others:
             pour(search.pool, first.pool)
-        due = ended in {1, rounds} or ended % max(1, rounds // _PARTS) == 0
+        parts = _PARTS_UNLIMITED if self._left is None else _PARTS
+        due = ended in {1, rounds} or ended % max(1, rounds // parts) == 0
         if due or (first.pool.size[0] > CAPACITY // 2 and self._affordable()):
             begin = time.monotonic()
             self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE))
@@ -95,28 +104,45 @@ class Combination:
         return min(begin + max(share * self._left, self.seconds), self._begin + self._left)
 
     def _combine(self, begin: float, until: float) -> None:
-        """Make the best choice of routes the incumbent, and tell the pools what routes are worth."""
+        """Ask for the routes that are missing, and make the best choice of routes the incumbent."""
 
         def passed(share: float) -> Callable[[], bool]:
             return lambda: time.monotonic() - begin >= share * (until - begin)
 
-        first = self.searches[0]
-        packing = Packing(first.arrays, first.pool, until)
+        packing = Packing(self.searches[0].arrays, self.searches[0].pool, until)
         relaxed = self._pricing.close(packing, self._best(), passed(_PRICED))
         if relaxed is not None:
             self._take(dive(packing, self._pricing, relaxed, self._best(), passed(_DIVED)))
             relaxed = packing.relax()
         if relaxed is not None:
-            self._take(packing.choose(relaxed, self._best()))
-            self._tell(relaxed)
+            if relaxed.price.any():
+                # Where everything can be had, no route is better than another.
+                self._take(packing.choose(relaxed, self._best()))
+            latest = self._dive_on(packing, relaxed, passed(_DIVED_ON))
+            self._tell(latest or relaxed)
+            if latest is not None:
+                self._thin(latest)
         self.proven = self._always_whole and self._pricing.bound < self._next()
 
+    def _dive_on(self, packing: Packing, relaxed: Relaxation, ended: Callable[[], bool]) -> Relaxation | None:
+        """Dive some times more, each time elsewhere; return the relaxation after that."""
+        found: Relaxation | None = relaxed
+        for _ in range(_DIVES_UNLIMITED if self._left is None else _DIVES):
+            if found is None or ended() or found.reward < self._next():
+                break
+            self._take(dive(packing, self._pricing, found, self._best(), ended, self._rng))
+            found = packing.relax()
+        return found
+
     def _tell(self, relaxed: Relaxation) -> None:
-        """Let routes be collected by their prices, and drop those that lose most."""
+        """Tell the pools what routes are worth, so that only promising ones are collected."""
         promised = max(0.0, relaxed.reward - self._next())
         for search in self.searches:
             search.pool.price[:] = relaxed.price
             search.pool.least[:] = relaxed.least - _SLACK * promised
+
+    def _thin(self, relaxed: Relaxation) -> None:
+        """Drop the routes that lose most."""
         pool = self.searches[0].pool
         size = int(pool.size[0])
         room = CAPACITY // 4 if size > CAPACITY // 2 else size
