@@ -66,6 +66,9 @@ M, N, K = 7, 15, 3
 LEARNED, TRIED = 1024, 64
 MOVES = {LEARNED: 60_000, TRIED: 400_000}
 LR, MUON_LR, TD_WEIGHT, OWN_EVERY, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 16, 4, 30
+SHUT = -60.0
+"""Bias of a gate that lets nothing through."""
+
 EPISODES = 24
 """An update of every variant."""
 
@@ -82,14 +85,20 @@ class Layer(nn.Module):
     def forward(self, seen):
         return torch.tanh(self.layer(seen)), None
 
+    @property
+    def all_weights(self):
+        """The weights of a recurrent cell that forgets all there was: what is left is tanh of the layer."""
+        weight, bias = self.layer.weight, self.layer.bias
+        none, shut = torch.zeros_like(bias), torch.full_like(bias, SHUT)
+        weight_ih = torch.cat([torch.zeros_like(weight), torch.zeros_like(weight), weight])
+        bias_ih = torch.cat([none, shut, bias])
+        return [[weight_ih, torch.zeros_like(weight_ih), bias_ih, torch.zeros_like(bias_ih)]]
+
 
 class ForgetfulAgent(UniversalAgent):
     def __init__(self, width, layers):
         super().__init__(width, layers)
         self.memory = Layer(width)
-
-    def remember(self, tokens, hidden):
-        return self.memory(tokens.mean(dim=1))[0]
 
 
 class Sum(nn.Module):
@@ -289,6 +298,8 @@ def main():
     with pool, file.open("a", encoding="utf-8") as out:
         futures = {pool.submit(run, *key, options.work): key for key in asked if key not in done}
         for count, future in enumerate(as_completed(futures), 1):
+            if future.exception():
+                pool.shutdown(wait=False, cancel_futures=True)
             done[futures[future]] = future.result()
             out.write(json.dumps([futures[future], future.result()]) + "\n")
             out.flush()

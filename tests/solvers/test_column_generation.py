@@ -116,6 +116,19 @@ def test_what_is_forgotten_is_remembered_where_it_matters(monkeypatch):
         assert pricing.bound == pytest.approx(whole.reward, abs=1e-6)
 
 
+def test_nobody_is_sent_where_nothing_is_needed():
+    problem = problem_of("deadlines", 7, n=8)
+    least, *others = sorted(problem.targets, key=lambda target: target.level)
+    served = replace(least, level=100.0, loadlist=(0.0,))
+    problem = replace(problem, targets=(served, *others))
+    _, pricing, relaxed, pool = closed(problem)
+    routes = [set(pool.target[q, : pool.length[q]].tolist()) for q in range(int(pool.size[0]))]
+    assert routes
+    assert all(0 not in route for route in routes)
+    assert relaxed.reward <= pricing.bound + 1e-6 < 100.0
+    assert relaxed.price[0] == 0.0
+
+
 def test_too_many_labels_give_routes_but_no_bound():
     problem = problem_of("deadlines", 1, n=12, m=4)
     _, pricing, relaxed, pool = closed(problem, room=40)

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.simulation.simulator import TOLERANCE
 from app.solvers.bound.instance import Instance, safely
-from app.solvers.column_generation.packing import Packing, reachable
+from app.solvers.column_generation.packing import Packing, reachable, worth
 from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool
 from app.solvers.column_generation.pricing import Pricing
 from app.solvers.protocol import StopCriterion
@@ -33,5 +33,5 @@ def route_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
     pool = new_pool(arrays, 4 * CAPACITY)
     pricing = Pricing(arrays, pool, room=_ROOM, effort=np.inf, tolerance=2.0 * TOLERANCE)
     pricing.close(Packing(arrays, pool), lower * instance.scale, stop)
-    bound = safely(pricing.bound, abs(pricing.bound) + float(arrays.level[0].sum()))
+    bound = safely(pricing.bound, abs(pricing.bound) + float(worth(arrays).sum()))
     return reachable(arrays, bound) / instance.scale

@@ -186,7 +186,7 @@ class Packing:
         room = np.bincount(self._pool.kind, minlength=m).astype(np.float64)
         program = highspy.HighsLp()
         program.num_col_, program.num_row_ = n + len(routes), m + n
-        program.col_cost_ = np.concatenate((-self._arrays.level[0], self._costs(routes)))
+        program.col_cost_ = np.concatenate((-worth(self._arrays), self._costs(routes)))
         program.col_lower_, program.col_upper_ = np.zeros(n + len(routes)), np.ones(n + len(routes))
         program.row_lower_ = np.full(m + n, -highspy.kHighsInf)
         program.row_upper_ = np.concatenate((room, np.zeros(n)))
@@ -262,6 +262,11 @@ def _common_measure(values: Floats, tolerance: float) -> float:
         while rest > tolerance:
             measure, rest = rest, math.fmod(measure, rest)
     return measure
+
+
+def worth(arrays: ProblemArrays) -> Floats:
+    """(N,) what a visit earns that meets the whole need; nothing where nothing is needed."""
+    return np.where(arrays.need_total[0] > 0, arrays.level[0], 0.0)
 
 
 def idle_cost(arrays: ProblemArrays) -> Floats:

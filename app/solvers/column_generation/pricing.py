@@ -21,7 +21,7 @@ from app.solvers.column_generation.labelling import (
     remember,
     values,
 )
-from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost
+from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost, worth
 from app.solvers.column_generation.pool import Pool
 
 _ROOM = 40_000
@@ -89,7 +89,8 @@ class Pricing:
         resources = {len(means.rate) for _, _, means in self._kinds}
         self._labels = {size: new_labels(n, size, room) for size in resources}
         self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
-        self._gain = _GAIN * float(arrays.level[0].max(initial=0.0))
+        self._worth = worth(arrays)
+        self._gain = _GAIN * float(self._worth.max(initial=0.0))
         self._idle, self._effort = idle_cost(arrays), effort
         self.bound = np.inf
         """What no choice of whole routes exceeds, whether they are in the pool or not."""
@@ -142,22 +143,22 @@ class Pricing:
         """Ask for routes at the prices of a relaxation, and bound what any choice of routes earns."""
         made, grew, remembered, complete = 0, False, False, exact and not packing.fixed
         spare = packing.spare()
-        bound = float(np.maximum(0.0, self._arrays.level[0] - relaxed.price).sum())
+        bound = float(np.maximum(0.0, self._worth - relaxed.price).sum())
         for asked, (i, many, means) in enumerate(self._kinds, start=1):
             if not spare[i]:
                 continue
             labels = self._labels[len(means.rate)]
             complete &= self._label(means, relaxed.price, labels, exact, ended)
             made += int(labels.size[0])
-            worth, least = values(means, labels), relaxed.least[i]
-            bound += many * max(worth.max(initial=-np.inf), -self._idle[i])
+            value, least = values(means, labels), relaxed.least[i]
+            bound += many * max(value.max(initial=-np.inf), -self._idle[i])
             before = self._known()
-            good = _most(worth, least - promised, _BATCH)
+            good = _most(value, least - promised, _BATCH)
             collect_labels(self._arrays, self._pool, i, labels, good, *self._scratch)
             if self._known() != before:
                 grew = True
             elif exact:
-                cycles = _most(worth, least + self._gain, _CYCLES)
+                cycles = _most(value, least + self._gain, _CYCLES)
                 remembered |= remember(self._ground, labels, cycles) > 0
             if ended():
                 # The others come first next time.
@@ -183,9 +184,9 @@ class Pricing:
         return size, float(self._pool.distance[:size].sum())
 
 
-def _most(worth: Floats, least: float, count: int) -> Integers:
+def _most(value: Floats, least: float, count: int) -> Integers:
     """Return the labels worth more than the least, at most so many, in the order in which they were found."""
-    good = np.flatnonzero(worth > least)
+    good = np.flatnonzero(value > least)
     if len(good) > count:
-        good = good[np.argpartition(-worth[good], count)[:count]]
+        good = good[np.argpartition(-value[good], count)[:count]]
     return np.sort(good)
