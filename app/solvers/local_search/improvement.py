@@ -47,14 +47,14 @@ class Cooling(NamedTuple):
     penalty
         What a visit that unloads nothing costs during the search.
     guide
-        What a leg between neighbours costs at least during the search; its time where there are deadlines,
-        otherwise its distance.
+        What a leg between neighbours costs during the search where distance is as good as free; its time
+        where there are deadlines, otherwise its distance.
     """
 
     hot: float = 0.1
     cold: float = 0.005
     penalty: float = 0.03
-    guide: float = 0.01
+    guide: float = 0.003
 
 
 class _Span(NamedTuple):
@@ -168,9 +168,10 @@ def _round(
     """One round of one search; the plan at its end is made legal."""
     scale = _level_scale(search.arrays)
     leg = _neighbour_leg(search)
+    haste, thrift = 0.0, 0.0
     if float(search.arrays.weight[0]) * leg < _FREE * scale:
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
-    haste, thrift = _guides(search, cooling.guide * scale, leg)
+        haste, thrift = _guides(search, cooling.guide * scale, leg)
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
     ratio = cooling.cold / cooling.hot
     done, share, told = 0, span.share(0), 0.0
