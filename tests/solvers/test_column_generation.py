@@ -21,6 +21,7 @@ from app.solvers.column_generation.pool import always_whole, collect, new_pool
 from app.solvers.column_generation.pricing import Pricing
 from app.solvers.exact import Exact
 from app.solvers.local_search.annealing import actions_of, drop_useless, new_search, set_routes
+from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
 from app.solvers.protocol import SolverContext
@@ -189,6 +190,21 @@ def test_a_search_ends_when_its_plan_is_proven_best():
     proof = Exact(ExactParameters(), SolverContext()).solve(problem, 1, never, lambda _: None).proof
     assert proof.proven
     assert proof.bound == pytest.approx(reward)
+
+
+def test_a_combination_ends_when_it_is_told_to():
+    problem = parcels(np.random.default_rng(23), m=6, n=40, latest=0.6)
+    search = new_search(compile_problem(problem))
+    looks = iter(range(1000))
+    combination = Combination([search], rounds=2, left=None)
+    combination.after_round(1, 2, lambda: next(looks) >= 3)
+    asked = next(looks)
+    assert 3 < asked < 40
+    assert not combination.proven
+    whole = Combination([search], rounds=2, left=None)
+    whole.after_round(1, 2, lambda: next(looks, None) is None)
+    assert next(looks) > 2 * asked
+    assert search.best[0] > 0.0
 
 
 def test_where_targets_share_loads_there_is_no_bound_over_whole_routes():

@@ -194,7 +194,7 @@ def test_combining_finds_a_plan_that_no_search_had():
     combination = Combination(searches, rounds=2, left=None)
     for search, filled in zip(combination.searches, searches, strict=True):
         pour(filled.pool, search.pool)
-    assert combination.after_round(2, 2) == 2
+    assert combination.after_round(2, 2, never) == 2
     after = float(searches[0].best[0])
     assert after > before
     assert replay(problem_to_record(problem), actions_of(searches[0]).tolist())["reward"] == after
@@ -207,9 +207,9 @@ def test_rounds_are_longer_where_plans_turn_out_to_have_many_visits():
     anneal(combination.searches[0], np.random.default_rng(1), 50_000, 3.0, 0.1, 0.3, 0.0, 0.0, True)
     drop_useless(search)
     assert search.best_length.sum() > 60
-    assert combination.after_round(1, 9) == 2
-    assert combination.after_round(2, 2) == 2
-    assert Combination([search], rounds=9, left=None).after_round(1, 9) == 9
+    assert combination.after_round(1, 9, never) == 2
+    assert combination.after_round(2, 2, never) == 2
+    assert Combination([search], rounds=9, left=None).after_round(1, 9, never) == 9
 
 
 def test_the_same_seed_and_threads_give_the_same_combined_plan():

@@ -14,6 +14,7 @@ from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool,
 from app.solvers.column_generation.pricing import Pricing
 from app.solvers.local_search.annealing import Search, drop_useless, set_routes
 from app.solvers.local_search.effort import combined_round
+from app.solvers.protocol import StopCriterion
 
 _PARTS, _PARTS_UNLIMITED = 3, 1
 """Parts of a search at whose ends its routes are combined, beside the end of its first round; the second
@@ -68,8 +69,15 @@ class Combination:
             if left is not None:
                 self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
 
-    def after_round(self, ended: int, rounds: int) -> int:
+    def after_round(self, ended: int, rounds: int, stop: StopCriterion) -> int:
         """Gather the routes after a round; now and then, and after the last one, combine them.
+
+        Parameters
+        ----------
+        ended, rounds
+            How many rounds have ended, and how many there are to be.
+        stop
+            Asked every few milliseconds, but not while HiGHS chooses.
 
         Returns
         -------
@@ -86,7 +94,7 @@ class Combination:
         due = ended in {1, rounds} or ended % max(1, rounds // parts) == 0
         if due or (first.pool.size[0] > CAPACITY // 2 and self._affordable()):
             begin = time.monotonic()
-            self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE))
+            self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE), stop)
             self._spent += time.monotonic() - begin
         if ended == 1 and self._left is not None:
             longer = combined_round(int(first.best_length.sum())) / combined_round(self._visits)
@@ -103,11 +111,11 @@ class Combination:
             return np.inf
         return min(begin + max(share * self._left, self.seconds), self._begin + self._left)
 
-    def _combine(self, begin: float, until: float) -> None:
+    def _combine(self, begin: float, until: float, stop: StopCriterion) -> None:
         """Ask for the routes that are missing, and make the best choice of routes the incumbent."""
 
         def passed(share: float) -> Callable[[], bool]:
-            return lambda: time.monotonic() - begin >= share * (until - begin)
+            return lambda: stop() or time.monotonic() - begin >= share * (until - begin)
 
         packing = Packing(self.searches[0].arrays, self.searches[0].pool, until)
         relaxed = self._pricing.close(packing, self._best(), passed(_PRICED))
@@ -115,7 +123,7 @@ class Combination:
             self._take(dive(packing, self._pricing, relaxed, self._best(), passed(_DIVED)))
             relaxed = packing.relax()
         if relaxed is not None:
-            if relaxed.price.any():
+            if relaxed.price.any() and not stop():
                 # Where everything can be had, no route is better than another.
                 self._take(packing.choose(relaxed, self._best()))
             latest = self._dive_on(packing, relaxed, passed(_DIVED_ON))

@@ -151,7 +151,7 @@ def improve_together(
                     other.result()
                 tried += count
                 if not stop():
-                    rounds = combination.after_round(number + 1, rounds)
+                    rounds = combination.after_round(number + 1, rounds, stop)
                 _share_best(searches)
             number += 1
             watch(1.0 if combination.proven else number / rounds, number)
