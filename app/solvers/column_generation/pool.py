@@ -47,9 +47,6 @@ class Pool(NamedTuple):
         (capacity,) its distance as far as it costs reward.
     size
         (1,) how many routes there are.
-    price, least
-        (N,) and (M,) what a visit to a target is worth, and what a route of a UAV has to be worth, less its
-        distance, to be of use; infinite before prices are known.
     """
 
     kind: Integers
@@ -61,8 +58,6 @@ class Pool(NamedTuple):
     target: Integers
     distance: Floats
     size: Integers
-    price: Floats
-    least: Floats
 
 
 def often_whole(arrays: ProblemArrays) -> bool:
@@ -97,8 +92,6 @@ def new_pool(arrays: ProblemArrays, capacity: int = CAPACITY) -> Pool:
         target=np.empty((capacity, int(arrays.max_steps[0])), np.int64),
         distance=np.empty(capacity),
         size=np.zeros(1, np.int64),
-        price=np.zeros(n),
-        least=np.full(m, np.inf),
     )
 
 
@@ -112,21 +105,6 @@ def _kinds(arrays: ProblemArrays) -> Integers:
     )
     _, first, kind = np.unique(told, axis=0, return_index=True, return_inverse=True)
     return first[kind.ravel()].astype(np.int64)
-
-
-@compiled
-def collect_if_promising(
-    arrays: ProblemArrays, pool: Pool, i: int, targets: Integers, length: int, flown: Floats
-) -> None:
-    """Put a route of UAV `i` into a pool if it is whole and a better plan may use it."""
-    earning = 0.0
-    for s in range(length):
-        earning += pool.price[targets[s]]
-    if earning < pool.least[i]:
-        return
-    earning -= arrays.weight[0] * charged_distance(arrays, i, targets, length, flown)
-    if earning >= pool.least[i]:
-        collect(arrays, pool, i, targets, length, flown)
 
 
 @compiled

@@ -114,7 +114,7 @@ class Pricing:
         Returns
         -------
         Relaxation or None
-            None where there are no routes.
+            None where HiGHS finds no optimum in time.
         """
         exact, effort = False, 0
         relaxed = packing.relax()

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_free
-from app.solvers.column_generation.pool import Pool, collect, collect_if_promising, new_pool
+from app.solvers.column_generation.pool import Pool, collect, new_pool
 from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (
     Change,
@@ -179,8 +179,7 @@ def anneal(
         What a unit of time, and of distance beyond its weight, costs during the search, in reward: room in
         the routes is worth something before anything is put into it.
     collecting
-        Whether routes go to the search's pool: those that a kept change leaves behind, and of those that are
-        only proposed the promising ones.
+        Whether the routes that a kept change makes go to the search's pool.
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
     weight = arrays.weight[0]
@@ -191,13 +190,6 @@ def anneal(
         temperature *= cooling
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
-        if collecting:
-            for side in range(2):
-                i = change.uav[side]
-                if i != NONE:
-                    collect_if_promising(
-                        arrays, pool, i, change.target[side], change.length[side], change.flown[side]
-                    )
         extra = extra_distance(arrays, routes, change)
         price = (weight + thrift) * extra + haste * extra_time(routes, change)
         # What the change has to bring to be kept; most bring less, and of many that is known beforehand.

@@ -41,9 +41,6 @@ _SEED = 20220816
 _WORTH_S = 0.1
 """Seconds from which on there is time for a combination."""
 
-_SLACK = 0.5
-"""Share of what the relaxation promises over the incumbent by which a route may fall short of its price."""
-
 
 class Combination:
     """The pools of searches that run side by side, where combining their routes is worth its time."""
@@ -127,7 +124,6 @@ class Combination:
                 # Where everything can be had, no route is better than another.
                 self._take(packing.choose(relaxed, self._best()))
             latest = self._dive_on(packing, relaxed, passed(_DIVED_ON))
-            self._tell(latest or relaxed)
             if latest is not None:
                 self._thin(latest)
         self.proven = self._always_whole and self._pricing.bound < self._next()
@@ -141,13 +137,6 @@ class Combination:
             self._take(dive(packing, self._pricing, found, self._best(), ended, self._rng))
             found = packing.relax()
         return found
-
-    def _tell(self, relaxed: Relaxation) -> None:
-        """Tell the pools what routes are worth, so that only promising ones are collected."""
-        promised = max(0.0, relaxed.reward - self._next())
-        for search in self.searches:
-            search.pool.price[:] = relaxed.price
-            search.pool.least[:] = relaxed.least - _SLACK * promised
 
     def _thin(self, relaxed: Relaxation) -> None:
         """Drop the routes that lose most."""
