@@ -11,8 +11,10 @@ from referee import replay
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate
+from app.solvers.bound import whole_routes
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.upper_bound import upper_bound
+from app.solvers.bound.visits import visit_bound
 from app.solvers.bound.whole_routes import route_bound
 from app.solvers.column_generation import labelling
 from app.solvers.column_generation.diving import dive
@@ -190,6 +192,17 @@ def test_a_search_ends_when_its_plan_is_proven_best():
     proof = Exact(ExactParameters(), SolverContext()).solve(problem, 1, never, lambda _: None).proof
     assert proof.proven
     assert proof.bound == pytest.approx(reward)
+
+
+def test_the_bound_over_visits_is_left_where_labels_are_too_many(monkeypatch):
+    monkeypatch.setattr(whole_routes, "_ROOM", 100)
+    problem = parcels(np.random.default_rng(24), m=12, n=70, latest=0.6, weight=0.2)
+    instance = new_instance(problem)
+    assert route_bound(instance, 0.0, never) == np.inf
+    over_visits = visit_bound(instance, 0.0, never)
+    assert over_visits < 0.999 * instance.worth.sum()
+    deadline = Deadline(2.0)
+    assert upper_bound(problem, None, deadline).value <= over_visits * instance.scale * (1.0 + 1e-9)
 
 
 def test_a_combination_ends_when_it_is_told_to():

@@ -71,9 +71,10 @@ def bound_without_sets(instance: Instance, lower: float, stop: StopCriterion) ->
     stop
         As for :func:`upper_bound`.
     """
-    value = route_bound(instance, lower, stop)
+    # The one over visits is quick; the other takes all the time there is where routes are many.
+    value = visit_bound(instance, lower, stop)
     if value > lower:
-        value = min(value, visit_bound(instance, lower, stop))
+        value = min(value, route_bound(instance, lower, stop))
     return max(lower, value)
 
 
