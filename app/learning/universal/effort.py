@@ -36,8 +36,8 @@ _EPOCHS = 2
 _EPISODES = 64
 """Episodes that an epoch of fine-tuning plays."""
 
-_EPOCH_WORK = 1e6
-"""Work of these together; about as long as learning takes."""
+_EPOCH_WORK = 4e6
+"""Work of these together, about a tenth of a second; larger problems have fewer of them."""
 
 _POLISH_SHARE = 0.2
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from app.learning.universal.rollout import play
 from app.learning.universal.unfolding import unfold
 from app.learning.universal.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays, stack
-from app.solvers.protocol import StopCriterion
+from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import seconds_left
 
 TURN_TOKENS = 4000
@@ -67,6 +68,8 @@ class FineTuning:
         Learning rate of Adam, discount.
     rng
         Source of the episodes.
+    spare
+        How many threads more playing may use at this moment; episodes are the same with any number.
     """
 
     def __init__(
@@ -78,10 +81,11 @@ class FineTuning:
         lr: float,
         gamma: float,
         rng: np.random.Generator,
+        spare: Callable[[], int] = none_spare,
     ) -> None:
         self._device = learning_device()
         self.policy = copy.deepcopy(policy).to(self._device)
-        self._arrays, self._rng, self._epochs = arrays, rng, 0
+        self._arrays, self._rng, self._spare, self._epochs = arrays, rng, spare, 0
         m, n, _ = arrays.shape
         tokens = m * int(arrays.max_steps[0]) * (n + 1)
         self._learned = batch_of(arrays, max(1, min(batch_size, TURN_TOKENS // tokens)))
@@ -113,7 +117,14 @@ class FineTuning:
         problem = np.zeros(episodes or self._played, np.int64)
         epsilon = np.where(np.arange(len(problem)) % 2, _EPSILON, 0.0)
         plans = play(
-            self.policy.agent, self._arrays, problem, self._rng, temperature, stop, epsilon=epsilon
+            self.policy.agent,
+            self._arrays,
+            problem,
+            self._rng,
+            temperature,
+            stop,
+            self._spare,
+            epsilon,
         ).plans
         if self._epochs % _TD_EVERY == 0:
             self._learn(plans[: self._learned], stop, imitate=False)

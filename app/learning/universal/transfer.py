@@ -185,6 +185,7 @@ class UniversalTransfer:
             lr=FINE_TUNING_LR,
             gamma=parameters.gamma,
             rng=self._tuning,
+            spare=self._spare,
         )
         done, temperature = 0, Temperature(self._arrays)
         while done < used.n_epochs and not self._stop():
