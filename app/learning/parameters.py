@@ -16,6 +16,8 @@ MAX_EPOCHS = 10_000_000
 MAX_STORED_EPISODES = 100_000
 MAX_HIDDEN_UNITS = 1024
 MAX_SAMPLES = 100_000
+REPLANS_A_SAMPLE = 3
+MAX_REPLANS = REPLANS_A_SAMPLE * MAX_SAMPLES
 MAX_MOVES = 10_000_000_000
 
 TABLE_3_EPOCHS = 200
@@ -120,6 +122,13 @@ class TransferQmixParameters(UpdateParameters):
         description="Sampled roll-outs beside the greedy one; 0 is the bare greedy roll-out; null: 64, fewer "
         "for large problems. Service mode only",
     )
+    replans: int | None = Field(
+        default=None,
+        ge=0,
+        le=MAX_REPLANS,
+        description="Sampled roll-outs of two to six UAVs in what the others of the best plan leave; null: "
+        "three for each of samples where fine-tuning or polish follows, else none. Service mode only",
+    )
     n_epochs: int | None = Field(
         default=None,
         ge=0,
@@ -159,7 +168,7 @@ class TransferQmixParameters(UpdateParameters):
     @model_validator(mode="after")
     def _paper_mode_has_no_search(self) -> Self:
         if self.mode == "paper":
-            for name in ("samples", "polish", "polish_moves"):
+            for name in ("samples", "replans", "polish", "polish_moves"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name} belongs to service mode; in paper mode leave it out")
         return self

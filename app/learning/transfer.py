@@ -128,7 +128,7 @@ def _fine_tune_and_polish(
 ) -> Solution:
     """Service mode from a policy for one size: fine-tuned the paper's way, polished as any other."""
     arrays = compile_problem(problem)
-    used = fill_in(parameters.model_copy(update={"samples": 0}), effort(arrays))
+    used = fill_in(parameters.model_copy(update={"samples": 0, "replans": 0}), effort(arrays))
     share = _TUNING_SHARE if used.polish_moves else 1.0
 
     def tell(progress: Progress) -> None:

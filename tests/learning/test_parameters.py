@@ -39,7 +39,7 @@ def test_service_mode_is_the_default(name):
     assert parse_parameters(name, {}).mode == "service"
 
 
-@pytest.mark.parametrize("given", [{"samples": 4}, {"polish": False}, {"polish_moves": 10}])
+@pytest.mark.parametrize("given", [{"samples": 4}, {"replans": 4}, {"polish": False}, {"polish_moves": 10}])
 def test_paper_mode_has_no_search(given):
     assert TransferQmixParameters(**given).mode == "service"
     with pytest.raises(ValidationError, match=f"{next(iter(given))} belongs to service mode"):

@@ -26,7 +26,14 @@ SERVICE = "transfer_qmix in service mode"
 SCRATCH = "qmix in service mode"
 LEARNING = {"n_epochs": 12, "evaluate_per_epoch": 3, "buffer_size": 4, "batch_size": 4}
 QUICK = {
-    SERVICE: {"mode": "service", "samples": 3, "n_epochs": 2, "polish": True, "polish_moves": 1000},
+    SERVICE: {
+        "mode": "service",
+        "samples": 3,
+        "replans": 9,
+        "n_epochs": 2,
+        "polish": True,
+        "polish_moves": 1000,
+    },
     SCRATCH: {"mode": "service", "n_epochs": 12, "batch_size": 4, "evaluate_per_epoch": 4},
     "transfer_qmix": {**LEARNING, "mode": "paper"},
     "qmix": {**LEARNING, "mode": "paper"},

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoint import encode
-from app.learning.parameters import TransferQmixParameters
+from app.learning.parameters import REPLANS_A_SAMPLE, TransferQmixParameters
 from app.learning.source_policies import Source
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.effort import Effort, batch_of, effort
@@ -24,6 +24,7 @@ from app.learning.universal.lanes import in_lanes
 from app.learning.universal.policy import UniversalPolicy
 from app.learning.universal.polishing import polish
 from app.learning.universal.recombination import Recombination
+from app.learning.universal.replanning import replan, round_of
 from app.learning.universal.rollout import play, play_in_orders
 from app.learning.universal.temperature import Temperature
 from app.learning.universal.turn_order import some_orders
@@ -38,7 +39,7 @@ FINE_TUNING_LR = 1e-4
 _TRIED_AT_SIGHT = 2
 """Policies of the shortlist that are tried where a greedy roll-out is all that is asked for."""
 
-_SHARES = {"roll-out": 0.05, "samples": 0.35, "fine-tuning": 0.55, "polish": 1.0}
+_SHARES = {"roll-out": 0.05, "samples": 0.25, "replans": 0.35, "fine-tuning": 0.55, "polish": 1.0}
 """Share of the work that is done at the end of each part."""
 
 
@@ -48,13 +49,14 @@ class Used:
 
     parameters: TransferQmixParameters
     samples: int
+    replans: int
     n_epochs: int
     polish_moves: int
 
     @property
     def is_bare(self) -> bool:
         """Whether the policy's greedy roll-out is all that is asked for."""
-        return not (self.samples or self.n_epochs or self.polish_moves)
+        return not (self.samples or self.replans or self.n_epochs or self.polish_moves)
 
 
 class UniversalTransfer:
@@ -88,8 +90,8 @@ class UniversalTransfer:
         self._recombination = Recombination(self._arrays, self._best)
         self._history = History()
         root = np.random.SeedSequence([abs(seed), int(seed < 0)])
-        streams = map(np.random.default_rng, root.spawn(4))
-        self._sampling, self._tuning, self._polishing, ordering = streams
+        streams = map(np.random.default_rng, root.spawn(5))
+        self._sampling, self._tuning, self._polishing, ordering, self._replanning = streams
         self._orders = some_orders(self._effort.orders, problem.n_uavs, ordering)
 
     def run(self, sources: Sequence[Source]) -> Solution:
@@ -116,6 +118,7 @@ class UniversalTransfer:
             self._tell("roll-out", 1.0)
             policy = cast(UniversalPolicy, source.network)
             self._sample(policy)
+            self._replan(policy)
             checkpoint = self._fine_tune(policy)
         else:
             self._history.add(0, self._best.reward)
@@ -172,6 +175,24 @@ class UniversalTransfer:
             done += count
             self._tell("samples", done / samples)
 
+    def _replan(self, policy: UniversalPolicy) -> None:
+        done, replans = 0, self._used.replans
+        while done < replans and not self._stop():
+            plans = replan(
+                policy.agent,
+                self._arrays,
+                self._best.actions,
+                min(round_of(replans), replans - done),
+                self._replanning,
+                self._stop,
+                self._spare,
+            )
+            if not len(plans):
+                return
+            self._recombination.consider(plans, self._stop)
+            done += round_of(replans)
+            self._tell("replans", min(1.0, done / replans))
+
     def _fine_tune(self, policy: UniversalPolicy) -> bytes | None:
         """Fine-tune a copy; its checkpoint, or None where no epoch was done."""
         used, best = self._used, self._best
@@ -223,7 +244,16 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     polished = parameters.polish is not False
     moves = default.polish_moves if parameters.polish_moves is None else parameters.polish_moves
     moves = moves if polished else 0
+    # Who asks for samples alone asks for them quickly.
+    replans = REPLANS_A_SAMPLE * samples if n_epochs or moves else 0
+    replans = replans if parameters.replans is None else parameters.replans
     filled = parameters.model_copy(
-        update={"samples": samples, "n_epochs": n_epochs, "polish": polished, "polish_moves": moves}
+        update={
+            "samples": samples,
+            "replans": replans,
+            "n_epochs": n_epochs,
+            "polish": polished,
+            "polish_moves": moves,
+        }
     )
-    return Used(filled, samples, n_epochs, moves)
+    return Used(filled, samples, replans, n_epochs, moves)
