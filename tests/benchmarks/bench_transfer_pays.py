@@ -3,7 +3,8 @@
     python tests/benchmarks/bench_transfer_pays.py --work FOLDER [--problems 24] [--seeds 3] [--workers 2]
 
 Fresh problems of all families and three sizes, K = 3. ``transfer_qmix`` in service mode, without its local
-search, for ``--transfer-seconds`` (1): it picks its source, samples and fine-tunes until the time is up.
+search, for ``--transfer-seconds`` (1): it picks its source, samples, plans groups anew (four times as many
+episodes as by default) and fine-tunes until the time is up.
 ``qmix`` in service mode, the same networks and the same fine-tuning from random weights, for
 ``--scratch-seconds`` (30). Both begin with the greedy rule's plan. Rewards are those of the best plan, over
 what a search of 400,000 moves earns. Time is processor time of one thread, what the solvers report later does
@@ -47,6 +48,7 @@ STREAM = 40_000_033
 MOMENTS = (0.1, 0.2, 0.3, 0.5, 0.7, 1, 2, 3, 5, 7, 10, 15, 20, 30, 45, 60)
 MOVES = 400_000
 FOREVER = 10**6
+REPLANS = 768
 
 
 def problem_of(number):
@@ -58,7 +60,8 @@ def problem_of(number):
 
 def solver_of(method, url):
     if method == "transfer":
-        return TransferQmix(TransferQmixParameters(polish=False, n_epochs=FOREVER), SolverContext(url))
+        parameters = TransferQmixParameters(polish=False, replans=REPLANS, n_epochs=FOREVER)
+        return TransferQmix(parameters, SolverContext(url))
     return Qmix(QmixParameters(n_epochs=FOREVER), SolverContext())
 
 
