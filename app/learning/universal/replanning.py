@@ -124,7 +124,9 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
         charge_return=np.repeat(arrays.charge_return, count),
         max_steps=np.repeat(arrays.max_steps, count),
     )
-    return Residual(left, uavs, targets)
+    # Compiled code is made anew for every order of memory, and nobody should wait for that.
+    left = ProblemArrays(**{name: np.ascontiguousarray(each) for name, each in left._asdict().items()})
+    return Residual(left, np.ascontiguousarray(uavs), np.ascontiguousarray(targets))
 
 
 def replan(
