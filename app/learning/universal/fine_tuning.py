@@ -13,7 +13,7 @@ from app.learning.device import learning_device
 from app.learning.universal.effort import batch_of, episodes_of
 from app.learning.universal.learner import Learner, make_batch
 from app.learning.universal.policy import UniversalPolicy
-from app.learning.universal.rollout import play
+from app.learning.universal.rollout import exploration, play
 from app.learning.universal.unfolding import unfold
 from app.learning.universal.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays, stack
@@ -25,10 +25,6 @@ TURN_TOKENS = 4000
 
 _TD_EVERY = 4
 """Every so many epochs, from the first, the TD loss is learned too; it takes longer than all the rest."""
-
-_EPSILON = 0.2
-"""Chance that a turn of every other episode is any that is allowed: where a policy has become sure, no
-bearable temperature makes it try something else, and recombination lives on routes that are new."""
 
 MAX_BYTES = 2**30
 """Most memory that an update may take; workers share a machine."""
@@ -115,7 +111,6 @@ class FineTuning:
             At which their actions are drawn.
         """
         problem = np.zeros(episodes or self._played, np.int64)
-        epsilon = np.where(np.arange(len(problem)) % 2, _EPSILON, 0.0)
         plans = play(
             self.policy.agent,
             self._arrays,
@@ -124,7 +119,7 @@ class FineTuning:
             temperature,
             stop,
             self._spare,
-            epsilon,
+            exploration(len(problem)),
         ).plans
         if self._epochs % _TD_EVERY == 0:
             self._learn(plans[: self._learned], stop, imitate=False)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from app.learning.universal.network import UniversalAgent
-from app.learning.universal.rollout import play
+from app.learning.universal.rollout import exploration, play
 from app.learning.universal.routes import fly_routes
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import ALLOWED, Episodes, act, new_episodes, reset_one, verdict
@@ -36,9 +36,6 @@ _LEAST_GROUPS, _MOST_GROUPS = 8, 24
 
 _ROUNDS = 3
 """Rounds that there are at least, where they have more groups than the least."""
-
-_EPSILON = 0.2
-"""Chance that a turn of every other episode is any that is allowed."""
 
 _TARGETS = 48
 """Most targets of a group's problem; those that could earn most."""
@@ -168,7 +165,7 @@ def replan(
         return np.empty((0, *plan.shape), np.int64)
     left, uavs, targets = residual_of(arrays, plan, groups, rng)
     which = np.repeat(np.arange(len(groups)), _EPISODES)[:episodes]
-    epsilon = np.where(np.arange(episodes) % 2, _EPSILON, 0.0)
+    epsilon = exploration(episodes)
     played = play(agent, left, which, rng, stop=stop, spare=spare, epsilon=epsilon).plans
     plans = np.empty((episodes + 1, *plan.shape), np.int64)
     _insert(arrays, new_episodes(arrays, 1), plan, left.ret, uavs, targets, which, played, plans)

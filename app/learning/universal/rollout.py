@@ -26,6 +26,15 @@ from app.simulation.simulator import Episodes, act, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never
 
+_EPSILON = 0.2
+"""Chance that a turn of every other episode is any that is allowed: where a policy has become sure, no
+bearable temperature makes it try something else, and recombination lives on routes that are new."""
+
+
+def exploration(episodes: int) -> Floats:
+    """Return the ``epsilon`` (B,) of episodes of which every other one explores."""
+    return np.where(np.arange(episodes) % 2, _EPSILON, 0.0)
+
 
 class Played(NamedTuple):
     """B episodes that were played.
