@@ -62,3 +62,4 @@ constraints:
 
 clean:
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find app policy_store tests -name __pycache__ -prune -exec rm -rf {} +

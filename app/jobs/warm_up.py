@@ -19,7 +19,7 @@ from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
 from app.simulation.arrays import compile_problem
-from app.simulation.compiled_cache import write_in_turns
+from app.simulation.compilation import write_in_turns
 from app.simulation.generator import generate
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters

@@ -12,8 +12,10 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from app.simulation.compilation import njit
 
 Float32s = npt.NDArray[np.float32]
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from app.domain.geometry import EARTH_RADIUS_KM
+from app.simulation.compilation import njit
 
 Floats = npt.NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])

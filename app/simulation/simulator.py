@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numba import njit
 
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
+from app.simulation.compilation import njit
 from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
 from app.solvers.parameters import GeneticParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion

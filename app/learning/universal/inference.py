@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numba import njit
 from torch import Tensor, nn
 
 from app.learning.kernels import (
@@ -34,6 +33,7 @@ from app.learning.universal.architecture import HEADS
 from app.learning.universal.lanes import helpers, lanes
 from app.learning.universal.network import UniversalAgent
 from app.simulation.arrays import Integers
+from app.simulation.compilation import njit
 
 _ZERO, _LEAST = np.float32(0.0), np.float32(-3e38)
 

@@ -11,11 +11,11 @@ nobody else goes to its targets. So only the routes that promise most by that ar
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.routes import fly_last, fly_routes
 from app.simulation.arrays import Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.explain import rewards_of
 from app.simulation.simulator import ALLOWED, Episodes, new_episodes
 from app.solvers.protocol import StopCriterion

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.rollout import exploration, play
 from app.learning.universal.routes import fly_routes
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.simulator import ALLOWED, Episodes, act, new_episodes, reset_one, verdict
 from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never

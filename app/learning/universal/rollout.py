@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from app.learning.kernels import Float32s
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -22,6 +21,7 @@ from app.learning.universal.observation import (
 )
 from app.learning.universal.turn_order import reorder, restore_plans
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.simulator import ALLOWED, START, Episodes, act, reset_one, verdict
 
 NOBODY = -1

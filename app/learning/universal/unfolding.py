@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from app.learning.kernels import Float32s
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -17,6 +16,7 @@ from app.learning.universal.observation import (
     observe,
 )
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
 
 

@@ -8,9 +8,9 @@ earns is the simulator's word, which knows who unloads first.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.compilation import njit
 from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
 from app.solvers.bound.instance import Instance
 from app.solvers.bound.relaxation import Pools, Priced

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from app.simulation.arrays import Floats, Integers
+from app.simulation.compilation import njit
 from app.simulation.simulator import compiled
 from app.solvers.bound.target_sets import Members
 

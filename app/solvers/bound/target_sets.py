@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from app.simulation.arrays import Floats, Integers
+from app.simulation.compilation import njit
 from app.simulation.simulator import TOLERANCE
 from app.solvers.bound.instance import Instance
 

@@ -8,9 +8,9 @@ more than looking at every pair of UAV and target once.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from app.simulation.arrays import Floats
+from app.simulation.compilation import njit
 from app.simulation.simulator import TOLERANCE
 from app.solvers.bound.instance import Instance, safely
 from app.solvers.protocol import StopCriterion

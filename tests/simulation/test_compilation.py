@@ -1,0 +1,115 @@
+"""Processes that compile the same functions at the same time lose nothing and mix nothing up."""
+
+import importlib
+import inspect
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from numba.core.dispatcher import Dispatcher
+
+from app.simulation.compilation import source_stamp, stamped_files
+
+MODULE = """
+from numba import njit
+
+@njit(cache=True)
+def double(x):
+    return x + x
+"""
+
+PROGRAM = """
+import sys, time
+from pathlib import Path
+import numpy as np
+from app.simulation.compilation import write_in_turns
+from doubling import double
+
+number, start = int(sys.argv[1]), Path(sys.argv[2])
+write_in_turns()
+write_in_turns()
+kinds = [np.int8, np.int16, np.int32, np.int64, np.uint8, np.uint16, np.uint32, np.float32]
+while number and not start.exists():
+    time.sleep(0.001)
+for kind in kinds[number % 4:] + kinds[: number % 4]:
+    assert double(np.full(3, 21, kind)).tolist() == [42] * 3
+    assert double(np.full((3, 1), 21, kind)).tolist() == [[42]] * 3
+if not number:
+    assert not double.stats.cache_misses, double.stats
+    assert sum(double.stats.cache_hits.values()) == 16, double.stats
+"""
+
+
+def test_several_writers_of_one_cache(tmp_path):
+    (tmp_path / "doubling.py").write_text(MODULE)
+    start = tmp_path / "start"
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{PROGRAM}"]
+    writers = [subprocess.Popen([*command, str(number), str(start)]) for number in (1, 2, 3, 4)]
+    start.touch()
+    assert [writer.wait(timeout=120) for writer in writers] == [0] * 4
+    subprocess.run([*command, "0", str(start)], check=True, timeout=120)
+
+
+ROOT = Path(__file__).parents[2]
+
+WHO_VISITS = """
+import numpy as np
+from app.simulation.generator import generate
+from app.solvers.genetic import GeneticAlgorithm
+from app.solvers.greedy import greedy_plan
+from app.solvers.parameters import GeneticParameters
+from app.solvers.protocol import SolverContext
+from app.solvers.stop import never
+
+problem = generate("uniform", 4, 6, 2, np.random.default_rng(3))
+genetic = GeneticAlgorithm(GeneticParameters(num_total=20, iteration=20), SolverContext())
+plans = [greedy_plan(problem), genetic.solve(problem, 1, never, lambda progress: None).plan]
+seen = [{action for row in plan.assignment for action in row} for plan in plans]
+print([0 in visited for visited in seen])
+"""
+
+
+def test_a_changed_rule_is_followed_wherever_it_is_inlined(tmp_path):
+    """The rule is changed in one file; its callers, in others, have machine code with the old rule in it."""
+    shutil.copytree(ROOT / "app", tmp_path / "app")
+    command = [sys.executable, "-c", WHO_VISITS]
+
+    def who_visits_target_0():
+        done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
+        return done.stdout.strip()
+
+    assert who_visits_target_0() == "[True, True]"
+    simulator = tmp_path / "app" / "simulation" / "simulator.py"
+    rule = "    if episodes.ret[b, i]:\n        return RETURNING\n"
+    changed = simulator.read_text().replace(rule, rule + "    if j == 0:\n        return OUT_OF_RANGE\n")
+    assert changed != simulator.read_text()
+    simulator.write_text(changed)
+    assert who_visits_target_0() == "[False, False]"
+
+
+def compiled_functions():
+    """Every function of the program that numba compiles, with the module that defines it."""
+    for path in sorted((ROOT / "app").rglob("*.py")):
+        if "njit" in path.read_text() or "compiled" in path.read_text():
+            module = importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+            for function in vars(module).values():
+                if isinstance(function, Dispatcher) and function.py_func.__module__ == module.__name__:
+                    yield module, function
+
+
+def test_the_stamp_of_a_function_covers_all_that_it_may_inline():
+    functions = list(compiled_functions())
+    assert len(functions) > 100
+    for module, function in functions:
+        covered = stamped_files(Path(module.__file__))
+        for name in function.py_func.__code__.co_names:
+            inlined = function.py_func.__globals__.get(name)
+            if isinstance(inlined, Dispatcher):
+                assert Path(inspect.getfile(inlined.py_func)) in covered, (module.__name__, name)
+
+
+def test_everything_compiled_keeps_its_code_by_that_stamp():
+    for module, function in compiled_functions():
+        stamp = function._cache._impl.locator.get_source_stamp()
+        assert stamp == source_stamp(Path(module.__file__)), function
