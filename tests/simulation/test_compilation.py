@@ -56,17 +56,10 @@ ROOT = Path(__file__).parents[2]
 WHO_VISITS = """
 import numpy as np
 from app.simulation.generator import generate
-from app.solvers.genetic import GeneticAlgorithm
 from app.solvers.greedy import greedy_plan
-from app.solvers.parameters import GeneticParameters
-from app.solvers.protocol import SolverContext
-from app.solvers.stop import never
 
-problem = generate("uniform", 4, 6, 2, np.random.default_rng(3))
-genetic = GeneticAlgorithm(GeneticParameters(num_total=20, iteration=20), SolverContext())
-plans = [greedy_plan(problem), genetic.solve(problem, 1, never, lambda progress: None).plan]
-seen = [{action for row in plan.assignment for action in row} for plan in plans]
-print([0 in visited for visited in seen])
+plan = greedy_plan(generate("uniform", 4, 6, 2, np.random.default_rng(3)))
+print(0 in {action for row in plan.assignment for action in row})
 """
 
 
@@ -79,13 +72,13 @@ def test_a_changed_rule_is_followed_wherever_it_is_inlined(tmp_path):
         done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
         return done.stdout.strip()
 
-    assert who_visits_target_0() == "[True, True]"
+    assert who_visits_target_0() == "True"
     simulator = tmp_path / "app" / "simulation" / "simulator.py"
     rule = "    if episodes.ret[b, i]:\n        return RETURNING\n"
     changed = simulator.read_text().replace(rule, rule + "    if j == 0:\n        return OUT_OF_RANGE\n")
     assert changed != simulator.read_text()
     simulator.write_text(changed)
-    assert who_visits_target_0() == "[False, False]"
+    assert who_visits_target_0() == "False"
 
 
 def compiled_functions():
