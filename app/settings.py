@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from app.processors import usable_processors
+
 Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 OWN_CLUSTER = "local"
 
 _SECONDS_A_DAY = 86_400.0
+_PUTTING_BACK_S = 2.0
+"""What is left of the time for a shutdown when the jobs that still run are put back into the queue."""
 
 
 class Settings(BaseSettings):
@@ -55,7 +58,7 @@ class Settings(BaseSettings):
         default="info", description="What is logged at least: `debug`, `info`, `warning` or `error`"
     )
     workers: int = Field(
-        default_factory=lambda: os.cpu_count() or 1,
+        default_factory=usable_processors,
         ge=1,
         le=256,
         description="Worker processes; default: one a processor",
@@ -92,7 +95,22 @@ class Settings(BaseSettings):
         description="Seconds a job may go on after its cancellation or time limit; then it is killed",
     )
     shutdown_grace_s: Seconds = Field(
-        default=10.0, description="Seconds running jobs get at shutdown; then they go back to the queue"
+        default=10.0,
+        description="Seconds a shutdown takes; 2 s before its end what still runs goes back to the queue",
+    )
+    max_run_s: float | None = Field(
+        default=3600.0,
+        gt=0,
+        allow_inf_nan=False,
+        description="Longest an allocation may run, in seconds; then it answers with its best plan; `null`: "
+        "no limit",
+    )
+    max_training_s: float | None = Field(
+        default=_SECONDS_A_DAY,
+        gt=0,
+        allow_inf_nan=False,
+        description="Longest a training may run, in seconds; then what it learned is registered; `null`: no "
+        "limit",
     )
     job_attempts: int = Field(
         default=3, ge=1, description="How often a job is tried whose worker or server died; then it fails"
@@ -109,7 +127,8 @@ class Settings(BaseSettings):
         default=20.0,
         gt=0,
         allow_inf_nan=False,
-        description="Seconds a client has to send a request; then it gets 408, and its connection is closed",
+        description="Seconds a client has to send a request, or it gets 408, and after which its connection "
+        "is closed if it has taken nothing of an answer",
     )
     max_body_bytes: int = Field(default=8 * 1024**2, ge=1024, description="Largest request body, in bytes")
     max_checkpoint_bytes: int = Field(
@@ -150,6 +169,11 @@ class Settings(BaseSettings):
     def worker_resources(self) -> dict[str, float]:
         """What a worker on Ray needs, the default filled in."""
         return dict(self.ray_resources) or {"CPU": float(self.threads_per_job)}
+
+    @property
+    def jobs_grace_s(self) -> float:
+        """Seconds that running jobs get at a shutdown."""
+        return max(0.0, self.shutdown_grace_s - _PUTTING_BACK_S)
 
     @property
     def job_retention_s(self) -> float | None:

@@ -52,7 +52,9 @@ def back_up(source: Path, target: Path) -> int:
     except (sqlite3.Error, OSError) as error:
         raise BackupFailed(source, str(error)) from error
     finally:
-        unfinished.unlink(missing_ok=True)
+        # SQLite's own files beside it too, which it leaves where the disk was full.
+        for ending in ("", "-journal", "-wal", "-shm"):
+            unfinished.with_name(unfinished.name + ending).unlink(missing_ok=True)
     return target.stat().st_size
 
 

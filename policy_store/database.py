@@ -17,6 +17,7 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
+from alembic.script.revision import ResolutionError
 from alembic.util import CommandError
 from sqlalchemy import URL, Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError
@@ -25,6 +26,11 @@ from policy_store import postgresql, sqlite
 from policy_store.announcements import Announcements
 from policy_store.engines import Engines
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
+
+_NEWER = (
+    "{}: the database was made by a newer version of this program; start that version, or go back to a backup "
+    "from before it"
+)
 
 
 class _Writers:
@@ -103,6 +109,8 @@ class Database:
     UnsupportedDatabase
         If the URL is none, names a database that is neither SQLite in a file nor PostgreSQL, or one whose
         driver is not installed.
+    DatabaseUnusable
+        If an SQLite file, or its folder, is missing and cannot be made, or cannot be written.
     """
 
     def __init__(
@@ -130,6 +138,27 @@ class Database:
         self.read_engine: Engine = engines.read
         self._migration_engine = engines.migrate
         self._writers = _writers_of(engines)
+        self._occupation = engines.occupation
+
+    def occupy(self) -> None:
+        """Keep other services off, where only one may work on the database, until :meth:`vacate`.
+
+        The end of this process ends it too. What is no service (a backup, the command line) works beside it.
+
+        Raises
+        ------
+        DatabaseOccupied
+            If another service works on it.
+        DatabaseUnusable
+            If the file beside the database that says so cannot be written.
+        """
+        if self._occupation is not None:
+            self._occupation.begin()
+
+    def vacate(self) -> None:
+        """Let another service work on the database; nothing happens where it was not occupied."""
+        if self._occupation is not None:
+            self._occupation.end()
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
@@ -199,7 +228,10 @@ class Database:
             try:
                 command.upgrade(config, "head")
             except CommandError as error:
-                raise MigrationFailed(str(script_location), str(error)) from error
+                newer = isinstance(error.__cause__, ResolutionError)
+                raise MigrationFailed(
+                    str(script_location), _NEWER.format(error) if newer else str(error)
+                ) from error
             if not self.shared and (broken := sqlite.broken_references(connection)):
                 raise MigrationFailed(str(script_location), "; ".join(broken[:5]))
 

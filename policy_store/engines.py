@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from sqlalchemy import Engine
 
+from policy_store.occupation import Occupation
+
 
 @dataclass(frozen=True, slots=True)
 class Engines:
@@ -23,6 +25,8 @@ class Engines:
         take no turns.
     environment
         Variables that hold what was taken out of the URL because nobody should read it.
+    occupation
+        What keeps other services off; None where several may work on it.
     """
 
     write: Engine
@@ -31,3 +35,4 @@ class Engines:
     lock_name: str
     shared: bool = False
     environment: Mapping[str, str] = field(default_factory=dict)
+    occupation: Occupation | None = None

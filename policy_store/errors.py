@@ -2,6 +2,8 @@
 
 PolicyStoreError
  ├─ UnsupportedDatabase     the URL names a database that the store cannot use
+ ├─ DatabaseUnusable        the file or its folder cannot be written
+ ├─ DatabaseOccupied        another service works on the file
  ├─ MigrationFailed         the tables cannot be brought to this version
  ├─ BackupFailed            the database cannot be copied
  ├─ NestedWrite             a thread that is inside a write transaction asked for a second one
@@ -33,6 +35,27 @@ class UnsupportedDatabase(PolicyStoreError):
         super().__init__(f"database {url!r} cannot be used: {reason}")
         self.url = url
         self.reason = reason
+
+
+class DatabaseUnusable(PolicyStoreError):
+    """The database file or its folder cannot be written."""
+
+    def __init__(self, database: str, reason: str) -> None:
+        super().__init__(f"database {database} cannot be written: {reason}")
+        self.database = database
+        self.reason = reason
+
+
+class DatabaseOccupied(PolicyStoreError):
+    """Another service works on the file; ``holder`` says which, if that is known."""
+
+    def __init__(self, database: str, holder: str) -> None:
+        super().__init__(
+            f"another service{f' ({holder})' if holder else ''} works on database {database}, and only one "
+            "can at a time: stop it, or let several share a PostgreSQL database"
+        )
+        self.database = database
+        self.holder = holder
 
 
 class MigrationFailed(PolicyStoreError):

@@ -12,6 +12,7 @@ What the settings are for:
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import time
 from collections.abc import Callable
@@ -22,17 +23,20 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.pool import NullPool, QueuePool
 
 from policy_store.engines import Engines
-from policy_store.errors import UnsupportedDatabase
+from policy_store.errors import DatabaseUnusable, UnsupportedDatabase
+from policy_store.occupation import Occupation
 
 _BUSY_TIMEOUT_S = 10.0
 _MIGRATION_BUSY_TIMEOUT_S = 60.0
 _WAL_RETRY_S = 0.02
+_PRIMARY_CODE = 0xFF
+_BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 
 
 def open_sqlite(
     url: URL, write_json: Callable[[Any], str] | None, read_json: Callable[[str], Any] | None
 ) -> Engines:
-    """Make the engines of an SQLite file; its folder is made where it is missing.
+    """Make the engines of an SQLite file; it and its folder are made where they are missing, for their owner.
 
     Parameters
     ----------
@@ -45,12 +49,14 @@ def open_sqlite(
     ------
     UnsupportedDatabase
         If the URL names no file: a database in memory would be another one for every connection.
+    DatabaseUnusable
+        If the file or its folder cannot be made, or cannot be written.
     """
     name = url.database
     if not name or name == ":memory:" or name.startswith("file:"):
         raise UnsupportedDatabase(str(url), "SQLite needs the path of a file")
     path = Path(name).resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _make(path)
     resolved = url.set(database=str(path))
     json: dict[str, Any] = {"json_serializer": write_json, "json_deserializer": read_json}
     return Engines(
@@ -68,7 +74,20 @@ def open_sqlite(
             poolclass=NullPool,
         ),
         lock_name=str(path),
+        occupation=Occupation(path),
     )
+
+
+def _make(path: Path) -> None:
+    """Make a file and its folder that only their owner can read, where they are missing."""
+    try:
+        path.parent.mkdir(parents=True, mode=0o700, exist_ok=True)
+        # SQLite gives its log beside the file the same rights.
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+    except OSError as error:
+        raise DatabaseUnusable(str(path), str(error)) from error
+    if not os.access(path.parent, os.W_OK):
+        raise DatabaseUnusable(str(path), f"its log beside it cannot be, {path.parent} is read-only")
 
 
 def size(connection: Connection) -> int:
@@ -119,8 +138,8 @@ def _use_wal(connection: sqlite3.Connection, timeout_s: float) -> None:
     while True:
         try:
             connection.execute("PRAGMA journal_mode = WAL")
-        except sqlite3.OperationalError:
-            if time.monotonic() > deadline:
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & _PRIMARY_CODE not in _BUSY or time.monotonic() > deadline:
                 raise
             time.sleep(_WAL_RETRY_S)
         else:

@@ -51,6 +51,11 @@ class AllocationRequest(ProblemModel):
         le=MAX_TIME_LIMIT_S,
         description="The answer comes within this time, with the best plan so far; null: no limit",
     )
+    keep_checkpoint: bool = Field(
+        default=False,
+        description="Whether what an algorithm learns is kept with the job, so that `POST /library` can "
+        "register it by its `job_id`; half a megabyte and more",
+    )
     bound: bool = Field(
         default=False, description="Whether the answer has an upper bound on the reward of any plan"
     )

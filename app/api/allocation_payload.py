@@ -28,6 +28,8 @@ def allocation_payload(body: AllocationRequest, services: Services) -> dict[str,
         "seed": body.seed,
         "library_url": services.database.url,
     }
+    if body.keep_checkpoint:
+        payload["keep_checkpoint"] = True
     if body.bound_seconds is not None:
         payload["bound_time_limit_s"] = body.bound_seconds
     return payload

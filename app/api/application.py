@@ -77,7 +77,7 @@ def create_application(settings: Settings) -> FastAPI:
             keys.migrate()
             service = JobService(
                 database,
-                job_kinds(store, limits),
+                job_kinds(store, limits, settings.max_run_s, settings.max_training_s),
                 _workers(settings, database),
                 reserve=_local(1, _WARM_UP_RESERVE, _largest(settings), settings, database),
                 max_queued={
@@ -101,7 +101,7 @@ def create_application(settings: Settings) -> FastAPI:
             try:
                 yield
             finally:
-                await service.stop(settings.shutdown_grace_s)
+                await service.stop(settings.jobs_grace_s)
         finally:
             database.dispose()
 

@@ -1,13 +1,14 @@
 """Many allocations of one request: each is a job, and is answered when it has ended.
 
 The jobs wait in a lane of their own, behind what somebody waits for one by one. They are taken in as fast as
-that lane has places, also after the client has gone; what was taken in is as durable as any other job.
+that lane has places; what was taken in is as durable as any other job. Where they have idempotency keys, by
+which a client that has gone can come again for them, all that goes on without it.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,7 +56,7 @@ class Batches:
     def __init__(self, jobs: JobService, kind: str) -> None:
         self._jobs = jobs
         self._kind = kind
-        self._going: set[asyncio.Task[None]] = set()
+        self._going: set[asyncio.Task[Any]] = set()
 
     async def begin(self, prepared: Sequence[Prepare]) -> AsyncIterator[Ended]:
         """Take in the first allocation, and return the answers of all as they come.
@@ -67,28 +68,42 @@ class Batches:
         Draining
             If the service is stopping.
         """
-        batch = _Batch(self._jobs, self._kind)
+        batch = _Batch(self._jobs, self._kind, self._keep)
         await batch.take_in(0, prepared[0], patient=False)
 
         async def take_in_others() -> None:
             for index, prepare in enumerate(prepared[1:], 1):
-                await batch.take_in(index, prepare, patient=True)
+                if not batch.is_given_up:
+                    await batch.take_in(index, prepare, patient=True)
 
-        submitting = asyncio.create_task(take_in_others())
-        self._going.add(submitting)
-        submitting.add_done_callback(self._going.discard)
+        self._keep(take_in_others())
         return batch.answers(len(prepared))
+
+    def _keep(self, work: Coroutine[Any, Any, None]) -> None:
+        """Do work whether or not somebody waits for it."""
+        task = asyncio.create_task(work)
+        self._going.add(task)
+        task.add_done_callback(self._going.discard)
 
 
 class _Batch:
     """A batch on its way."""
 
-    def __init__(self, jobs: JobService, kind: str) -> None:
+    def __init__(
+        self, jobs: JobService, kind: str, keep: Callable[[Coroutine[Any, Any, None]], None]
+    ) -> None:
         self._jobs = jobs
         self._kind = kind
+        self._keep = keep
         self._answers: asyncio.Queue[Ended] = asyncio.Queue()
-        self._waiting: set[asyncio.Task[None]] = set()
+        self._waiting: dict[asyncio.Task[None], str] = {}
         self._left_alone = False
+        self._comes_again = False
+
+    @property
+    def is_given_up(self) -> bool:
+        """Whether the client has gone, and cannot come again."""
+        return self._left_alone and not self._comes_again
 
     async def take_in(self, index: int, prepare: Prepare, *, patient: bool) -> None:
         """Make an allocation a job; who is patient waits for a place, and takes every error for an answer."""
@@ -102,10 +117,12 @@ class _Batch:
             self._answers.put_nowait((index, error))
             await asyncio.sleep(0)  # others have their turn between two problems that are wrong
         else:
-            if not self._left_alone:
+            if self.is_given_up:
+                await self._jobs.abandon(job.id)
+            elif not self._left_alone:
                 task = asyncio.create_task(self._wait(index, job.id))
-                self._waiting.add(task)
-                task.add_done_callback(self._waiting.discard)
+                self._waiting[task] = job.id
+                task.add_done_callback(lambda done: self._waiting.pop(done, None))
 
     async def answers(self, count: int) -> AsyncIterator[Ended]:
         """Yield so many answers; if nobody takes them any more, nobody waits for the jobs either."""
@@ -114,10 +131,17 @@ class _Batch:
                 yield await self._answers.get()
         finally:
             self._left_alone = True
-            for task in self._waiting:
-                task.cancel()
+            self._keep(self._leave())
+
+    async def _leave(self) -> None:
+        """Stop waiting for the jobs, and cancel them if nobody can ask for them any more."""
+        for task, job_id in list(self._waiting.items()):
+            if self.is_given_up:
+                await self._jobs.abandon(job_id)
+            task.cancel()
 
     async def _submit(self, submission: Submission, patient: bool) -> Job:
+        self._comes_again = submission.idempotency is not None
         while True:
             try:
                 job, _ = await self._jobs.submit(

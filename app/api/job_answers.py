@@ -6,36 +6,43 @@ import hashlib
 import json
 from typing import Any
 
-from starlette.responses import JSONResponse
+from fastapi import Request
+from starlette.responses import Response
 
 from app.api.access.guard import client
 from app.api.errors import JobCancelled, JobFailed
-from app.api.job_models import job_model, result_of
+from app.api.job_models import job_response, result_of
 from app.api.preferences import Preferences
+from app.api.problem_models import WireModel
+from app.api.stored_json import write
 from app.jobs.errors import Draining
 from app.jobs.model import Idempotency, Job, JobStatus
 
 
-def idempotency(
-    key: str | None, kind: str, payload: dict[str, Any], time_limit_s: float | None = None
-) -> Idempotency | None:
+def idempotency(key: str | None, kind: str, body: WireModel) -> Idempotency | None:
     """Make the promise of an ``Idempotency-Key``: the same key comes with the same request only.
 
-    What is compared is the request as it was understood, so that a default which is spelled out, or another
-    order of fields, is the same request. Keys of the service tell its clients apart.
+    What is compared is what the client sent, whatever order its fields had: a default may have another value
+    in the version of the service that gets the retry. Keys of the service tell its clients apart.
     """
     if key is None:
         return None
-    text = json.dumps([kind, payload, time_limit_s], sort_keys=True)
+    text = json.dumps([kind, body.model_dump(mode="json", exclude_unset=True)], sort_keys=True)
     return Idempotency(client.get(), key, hashlib.sha256(text.encode()).hexdigest())
 
 
-def accepted(job: Job, preferences: Preferences | None = None) -> JSONResponse:
+def accepted(job: Job, preferences: Preferences | None = None) -> Response:
     """Answer 202 with the job and where to follow it."""
     headers = {"Location": f"/jobs/{job.id}"}
     if preferences is not None and preferences.applied:
         headers["Preference-Applied"] = preferences.applied
-    return JSONResponse(job_model(job).model_dump(mode="json"), 202, headers)
+    return job_response(job, None if job.result is None else write(job.result), 202, headers)
+
+
+async def gone(request: Request) -> None:
+    """Return when the client of a request, whose body was read, has closed the connection."""
+    while (await request.receive())["type"] != "http.disconnect":
+        continue
 
 
 def answer_of(job: Job, blamed: str | None = None) -> dict[str, Any]:

@@ -19,7 +19,9 @@ TRAIN = "train"
 REGISTER = "register"
 
 
-def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
+def job_kinds(
+    library: PolicyLibrary, limits: ContainerLimits, max_run_s: float | None, max_training_s: float | None
+) -> list[JobKind]:
     """List the kinds of job.
 
     Parameters
@@ -28,6 +30,8 @@ def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
         Where policies are registered, in the transaction that ends their job.
     limits
         What a checkpoint may have at most.
+    max_run_s, max_training_s
+        How long an allocation and a training may run, in seconds; None: as long as they like.
     """
 
     def add_to_library(connection: Connection, job: Job, work: WorkResult) -> dict[str, Any]:
@@ -38,9 +42,15 @@ def job_kinds(library: PolicyLibrary, limits: ContainerLimits) -> list[JobKind]:
         return {**work.result, "policy_id": policy.id}
 
     return [
-        JobKind(ALLOCATE, "app.jobs.work:allocate", "interactive", at_once="app.jobs.work:allocate_at_once"),
-        JobKind(BATCH, "app.jobs.work:allocate", "batch"),
-        JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library),
+        JobKind(
+            ALLOCATE,
+            "app.jobs.work:allocate",
+            "interactive",
+            at_once="app.jobs.work:allocate_at_once",
+            max_run_s=max_run_s,
+        ),
+        JobKind(BATCH, "app.jobs.work:allocate", "batch", max_run_s=max_run_s),
+        JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library, max_run_s=max_training_s),
         # The weights are the job's artifact, and the policy's.
         JobKind(
             REGISTER,

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from datetime import datetime
 from typing import Any
 
 from pydantic import Field
+from starlette.responses import Response
 
 from app.api.allocation_models import AnswerModel
 from app.api.problem_details import FieldError
+from app.jobs import model
 from app.jobs.model import Job, JobPage, JobStatus
 
 
-class ProgressModel(AnswerModel):
-    """How far a job is, and the best it has found."""
+class ProgressSummary(AnswerModel):
+    """How far a job is."""
 
     fraction: float = Field(description="Of the work, 0 to 1")
     epoch: int | None = Field(description="Epochs done, where the work has epochs")
     best_reward: float | None = Field(description="Reward of the best plan so far")
+
+
+class ProgressModel(ProgressSummary):
+    """How far a job is, and the best it has found."""
+
     assignment: list[list[int]] | None = Field(description="The best plan so far")
 
 
@@ -30,22 +38,26 @@ class JobErrorModel(AnswerModel):
     details: dict[str, Any] = Field(description="Further facts, such as the `sizes` there are")
 
 
-class JobSummary(AnswerModel):
-    """A job without what it found."""
-
+class _JobFields(AnswerModel):
     id: str = Field(description="32 hexadecimal digits")
     kind: str = Field(description="allocate, batch (an allocation of one), train or register")
     status: JobStatus = Field(description="Where it is in its life")
     created_at: datetime = Field(description="When it was asked for, UTC")
     started_at: datetime | None = Field(description="When its newest attempt began, UTC")
     finished_at: datetime | None = Field(description="When it ended, UTC")
-    progress: ProgressModel = Field(description="How far it is")
     error: JobErrorModel | None = Field(description="Why it failed, if it did")
 
 
-class JobModel(JobSummary):
+class JobSummary(_JobFields):
+    """A job without what it found."""
+
+    progress: ProgressSummary = Field(description="How far it is")
+
+
+class JobModel(_JobFields):
     """A job with what it found."""
 
+    progress: ProgressModel = Field(description="How far it is")
     result: dict[str, Any] | None = Field(
         description="Of an allocation the answer of `POST /allocate`; a training's has `policy_id` too. "
         "A job that was cancelled in its midst has the best it had found."
@@ -59,30 +71,48 @@ class JobList(AnswerModel):
     next_cursor: str | None = Field(description="`cursor` of the next page; null on the last")
 
 
-def job_summary(job: Job) -> JobSummary:
-    """Describe a job without its result."""
-    return JobSummary(**_summary(job))
-
-
-def job_model(job: Job) -> JobModel:
-    """Describe a job with its result."""
-    return JobModel(**_summary(job), result=result_of(job))
+def job_response(
+    job: model.JobSummary, result: str | None, status: int = 200, headers: dict[str, str] | None = None
+) -> Response:
+    """Answer with a job and its result, which is JSON and goes out as it is stored, however large it is."""
+    progress = ProgressModel(**job.progress.as_json())
+    described = JobModel(**_fields(job), progress=progress, result=None).model_dump_json(exclude={"result"})
+    if result is not None and (elapsed_s := _elapsed_s(job)) is not None:
+        first, last = {"job_id": job.id}, {"elapsed_s": elapsed_s}
+        result = _joined(json.dumps(first), result, json.dumps(last))
+    whole = _joined(described, f'{{"result":{result or "null"}}}')
+    return Response(whole, status, headers, media_type="application/json")
 
 
 def job_list(page: JobPage) -> JobList:
     """Describe a page of jobs."""
-    return JobList(jobs=[job_summary(job) for job in page.jobs], next_cursor=page.next_cursor)
+    jobs = []
+    for job in page.jobs:
+        known = job.progress
+        progress = ProgressSummary(fraction=known.fraction, epoch=known.epoch, best_reward=known.best_reward)
+        jobs.append(JobSummary(**_fields(job), progress=progress))
+    return JobList(jobs=jobs, next_cursor=page.next_cursor)
 
 
 def result_of(job: Job) -> dict[str, Any] | None:
     """Return a job's result with its id and how long it took, from its arrival to its end, in seconds."""
-    if job.result is None or job.finished_at is None:
+    elapsed_s = _elapsed_s(job)
+    if job.result is None or elapsed_s is None:
         return None
-    elapsed = (job.finished_at - job.created_at).total_seconds()
-    return {"job_id": job.id, **job.result, "elapsed_s": elapsed}
+    return {"job_id": job.id, **job.result, "elapsed_s": elapsed_s}
 
 
-def _summary(job: Job) -> dict[str, Any]:
+def _elapsed_s(job: model.JobSummary) -> float | None:
+    return None if job.finished_at is None else (job.finished_at - job.created_at).total_seconds()
+
+
+def _joined(*objects: str) -> str:
+    """Return the JSON object that has the members of all of these, in their order."""
+    members = (text.strip()[1:-1] for text in objects)
+    return f"{{{','.join(each for each in members if each.strip())}}}"
+
+
+def _fields(job: model.JobSummary) -> dict[str, Any]:
     error = job.error
     return {
         "id": job.id,
@@ -91,7 +121,6 @@ def _summary(job: Job) -> dict[str, Any]:
         "created_at": job.created_at,
         "started_at": job.started_at,
         "finished_at": job.finished_at,
-        "progress": ProgressModel(**job.progress.as_json()),
         "error": None
         if error is None
         else JobErrorModel(

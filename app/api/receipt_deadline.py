@@ -1,8 +1,9 @@
 """What the server lacks for clients that do not play by the rules: a deadline, and problem details.
 
-A client that sends its request byte by byte, or nothing at all, would hold its connection for ever. What is
-timed is the receipt alone: an answer may take as long as it likes, and a connection that rests between two
-requests is the keep-alive timer's. What is no HTTP at all is answered like every other error.
+A client that sends its request byte by byte, or nothing at all, would hold its connection for ever, and so
+would one that takes nothing of its answer. An answer may take as long as it likes to be made, and a reader
+that takes it bit by bit is waited for; a connection that rests between two requests is the keep-alive
+timer's. What is no HTTP at all is answered like every other error.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ def protocol_with_deadline(seconds: float) -> type[H11Protocol]:
     ----------
     seconds
         From the opening of the connection, or from the first byte of a later request, to its last byte. Who
-        has sent a part by then gets 408, who has sent nothing is not answered; both are closed.
+        has sent a part by then gets 408, who has sent nothing is not answered; both are closed. So is who
+        has taken nothing, for as long, of an answer that waits to be sent.
     """
 
     class DeadlineProtocol(_DeadlineProtocol):
@@ -42,6 +44,7 @@ class _DeadlineProtocol(H11Protocol):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._deadline: asyncio.TimerHandle | None = None
+        self._reading: asyncio.TimerHandle | None = None
         # Of a request that is refused before the application has it; its connection ends with it.
         self._refused_id = uuid.uuid4().hex
 
@@ -51,7 +54,39 @@ class _DeadlineProtocol(H11Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._disarm()
+        if self._reading is not None:
+            self._reading.cancel()
         super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._watch_reader()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        self._watch_reader()
+
+    def _watch_reader(self) -> None:
+        """Begin to see that what waits to be sent becomes less, until there is none."""
+        unsent = self.transport.get_write_buffer_size()
+        if unsent and self._reading is None:
+            self._reading = self.loop.call_later(self.receive_timeout_s, self._look_at_reader, unsent)
+
+    def _look_at_reader(self, before: int) -> None:
+        self._reading = None
+        if self.transport.get_write_buffer_size() < before:
+            self._watch_reader()
+            return
+        with bound_contextvars(request_id=self._refused_id):
+            self.logger.info("nothing of an answer was taken within %g s", self.receive_timeout_s)
+        self.transport.abort()
+
+    def shutdown(self) -> None:
+        # A request that has not arrived would wait for the server's end; all others are answered.
+        if self._receives():
+            self._refuse("draining", "the service is stopping")
+        else:
+            super().shutdown()
 
     def handle_events(self) -> None:
         # What the server logs here is of a request that it refuses; others get the id of their own.
@@ -82,12 +117,18 @@ class _DeadlineProtocol(H11Protocol):
         self._deadline = None
         if self.transport.is_closing():
             return
-        if self._receives():
-            self._answer(
-                "request-timeout", f"the request was not received within {self.receive_timeout_s:g} s"
-            )
         with bound_contextvars(request_id=self._refused_id):
             self.logger.info("a request was not received within %g s", self.receive_timeout_s)
+        if self._receives():
+            self._refuse(
+                "request-timeout", f"the request was not received within {self.receive_timeout_s:g} s"
+            )
+        else:
+            self.transport.close()
+
+    def _refuse(self, code: str, detail: str) -> None:
+        """Answer a request of which a part has arrived, and close the connection."""
+        self._answer(code, detail)
         if self.cycle is not None and not self.cycle.response_complete:
             # Whoever reads the body learns that there is no more of it, and what they answer is not sent.
             self.cycle.disconnected = True

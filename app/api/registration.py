@@ -6,6 +6,7 @@ import base64
 from typing import Any
 
 from app.api.errors import JobWithoutCheckpoint
+from app.api.job_kinds import ALLOCATE, BATCH
 from app.api.library_models import RegisterCheckpoint, RegisterJob, RegisterTraining
 from app.api.problem_models import to_problem
 from app.api.services import Services
@@ -79,12 +80,13 @@ async def job_payload(body: RegisterJob, services: Services) -> dict[str, Any]:
     JobNotFound
         If there is no such job.
     JobWithoutCheckpoint
-        If it has not ended, or has learned nothing.
+        If it has not ended, has learned nothing, or was not asked to keep what it learned.
     """
     job = await services.jobs.get(body.job_id)
     checkpoint = await services.jobs.artifact(job.id) if job.status.finished else None
     if checkpoint is None:
-        raise JobWithoutCheckpoint(job.id, job.status)
+        could_keep = job.kind in (ALLOCATE, BATCH) and not job.payload.get("keep_checkpoint")
+        raise JobWithoutCheckpoint(job.id, job.status, could_keep=could_keep)
     if body.task is None:
         record = job.payload["problem"]
     else:

@@ -3,31 +3,37 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
-import uvicorn
 from sqlalchemy import make_url
+from sqlalchemy.exc import SQLAlchemyError
 
+from app.api.access.keys import KeyStore
 from app.api.allocation_models import Allocation, AllocationRequest
-from app.api.application import create_application
 from app.api.problem_models import to_problem
-from app.api.receipt_deadline import protocol_with_deadline
+from app.api.server import Server
 from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
 from app.cli.progress import bar
 from app.domain.records import problem_to_record
 from app.jobs import model
+from app.jobs.owner import new_owner
+from app.jobs.store import JobStore
 from app.jobs.work_context import WorkContext
 from app.library.seeding import seed_library
 from app.logs import configure_logs
 from app.memory import limit_arenas
+from app.processors import usable_processors
+from app.settings import Settings
 from app.solvers.registry import parse_parameters
 from policy_store.backup import back_up
-from policy_store.errors import BackupFailed
+from policy_store.database import Database
+from policy_store.errors import BackupFailed, PolicyStoreError
+from policy_store.library import PolicyLibrary
 
 Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
 Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
@@ -54,17 +60,31 @@ def serve(
                 err=True,
             )
             raise typer.Exit(2)
+    _prepare(settings)
     configure_logs(settings.log_level)
     limit_arenas()
-    uvicorn.run(
-        create_application(settings),
-        host=settings.host,
-        port=settings.port,
-        log_config=None,
-        access_log=False,
-        http=protocol_with_deadline(settings.receive_timeout_s),
-        timeout_graceful_shutdown=int(settings.shutdown_grace_s),
-    )
+    server = Server(settings)
+    with suppress(KeyboardInterrupt):
+        server.run()
+    if not server.started:
+        raise typer.Exit(3)
+
+
+def _prepare(settings: Settings) -> None:
+    """Bring the database to this version, or end with what is in the way of that."""
+    try:
+        database = Database(settings.resolved_database_url)
+        try:
+            # A newer version must not change what another service works on.
+            database.occupy()
+            for store in (PolicyLibrary(database), KeyStore(database), JobStore(database, new_owner(), 1)):
+                store.migrate()
+        finally:
+            database.vacate()
+            database.dispose()
+    except (PolicyStoreError, SQLAlchemyError) as error:
+        typer.echo(f"the service cannot start: {getattr(error, 'orig', None) or error}", err=True)
+        raise typer.Exit(1) from None
 
 
 def allocate(
@@ -113,7 +133,7 @@ def allocate(
 def compile_code(
     processes: Annotated[
         int, typer.Option(min=1, help="Processes that compile at a time.", show_default="the cores there are")
-    ] = len(os.sched_getaffinity(0)),
+    ] = usable_processors(),
 ) -> None:
     """Make and keep the compiled code that the service's workers load; takes minutes the first time."""
     from app.jobs.warm_up import compile_all  # noqa: PLC0415 - slow to load

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.jobs.model import Lane
-from app.jobs.owner import is_alive
 from app.jobs.run import Run
 
 
@@ -66,7 +65,7 @@ class Company(Protocol):
 
 
 class Alone:
-    """There are no others: an owner that is not this one is alive if its process is.
+    """There are no others: the database belongs to this service as long as it runs.
 
     Parameters
     ----------
@@ -86,8 +85,8 @@ class Alone:
         """Do nothing."""
 
     def is_alive(self, owner: str) -> bool:
-        """Say whether the process of an owner lives, on this machine."""
-        return is_alive(owner, self._owner)
+        """Say whether it is this service: every other one has ended, or the database would be occupied."""
+        return owner == self._owner
 
     def tell_waiting(self, lane: Lane) -> None:
         """Tell nobody."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import random
 import time
-from collections.abc import Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -23,22 +24,26 @@ from app.jobs.executor import Execution, Executor
 from app.jobs.housekeeping import Housekeeping
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
 from app.jobs.last_minute import LastMinute
-from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, Lane, Load, Progress
+from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, JobSummary, Lane, Load, Progress
 from app.jobs.observer import JobObserver
 from app.jobs.recovery import Recovery
-from app.jobs.run import Run
+from app.jobs.run import Run, Runs
 from app.jobs.settling import Settling
 from app.jobs.shared import company_on
-from app.jobs.store import Claim, JobStore, QueueLimit
+from app.jobs.store import JobStore, QueueLimit
+from app.jobs.transitions import Claim
 from app.jobs.waiting import Waiting
 from app.jobs.writer import Writer
 from app.logs import labels
 
 _PAUSE_S = 0.1
 _SETTLE_S = 20.0
+# Those who are told when to come again do not all come at once.
+_LATEST_RETURN = 1.5
 
 _log = logging.getLogger(__name__)
 T = TypeVar("T")
+J = TypeVar("J", bound=JobSummary)
 
 
 class Dispatcher:
@@ -81,10 +86,11 @@ class Dispatcher:
         self._writer = Writer()
         self._settling = Settling(store, self._writer, self._kinds, overrun_grace_s)
         self._lanes = Lanes(executor.capacity)
-        self._runs: dict[str, Run] = {}
+        self._runs = Runs()
+        self._clock = store.clock
         self._wake = asyncio.Event()
         self._company = company_on(store.database, owner, lease_s, self._writer, self._runs, channels)
-        self._last_minute = LastMinute(self._answer_at_once)
+        self._last_minute = LastMinute(self._answer_at_once, self._clock.now)
         self._waiting = Waiting(
             self._lanes,
             self._kinds,
@@ -103,12 +109,8 @@ class Dispatcher:
         self._reserve_ready = asyncio.Event()
         self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
-        self._house = Housekeeping(
-            store, self._writer, self._runs.values, self._recovery.look_after, retention_s
-        )
+        self._house = Housekeeping(store, self._writer, self._runs, self._recovery.look_after, retention_s)
         self._housekeeping: asyncio.Task[None] | None = None
-        # Of the jobs that wait or run; one that an earlier process took in has lost its request's id.
-        self._labels: dict[str, dict[str, str]] = {}
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
         self._accepting = False
@@ -152,7 +154,7 @@ class Dispatcher:
             await self._dispatching
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=grace_s)
-        for run in self._runs.values():
+        for run in self._runs:
             run.kill("stop")
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
@@ -191,9 +193,13 @@ class Dispatcher:
         idempotency: Idempotency | None,
     ) -> tuple[Job, bool]:
         lane = kind.lane
+        if not self._runs and not any((*self._lanes.running.values(), *self._lanes.waiting.values())):
+            self._clock.follow()
         run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
         places = self._max_queued[lane]
-        limit = QueueLimit(places, self._lanes.time_to_work_off(lane, places, self._running(lane)))
+        free_in_s = self._lanes.time_to_a_place(lane, self._runs.times(self._clock.now()))
+        limit = QueueLimit(places, free_in_s * random.uniform(1.0, _LATEST_RETURN))
+        asked_by = labels()
         if run_now:
             self._lanes.running[lane] += 1
         try:
@@ -205,6 +211,8 @@ class Dispatcher:
                 limit=limit,
                 time_limit_s=time_limit_s,
                 idempotency=idempotency,
+                request_id=asked_by.get("request_id"),
+                key_id=asked_by.get("key_id"),
             )
         except BaseException:
             if run_now:
@@ -212,7 +220,6 @@ class Dispatcher:
             raise
         if created:
             _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
-            self._labels[claim.job.id] = labels()
         if created and run_now:
             self._begin(claim)
         elif created:
@@ -220,14 +227,6 @@ class Dispatcher:
         elif run_now:
             self._give_back(lane)
         return claim.job, created
-
-    def _running(self, lane: Lane) -> Iterator[tuple[float, float | None]]:
-        """Tell of what runs in a lane for how long it has, and how long its time limit leaves it."""
-        now = time.time()
-        for run in self._runs.values():
-            if run.job.lane == lane and not run.at_once and run.job.started_at is not None:
-                ran_s = max(0.0, now - run.job.started_at.timestamp())
-                yield ran_s, None if run.deadline is None else run.deadline - now
 
     async def cancel(self, job_id: str) -> Job:
         """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""
@@ -237,10 +236,12 @@ class Dispatcher:
 
     async def _cancel(self, job_id: str) -> Job:
         job, before = await self._writer.write(self._store.cancel, job_id)
+        if not before.finished:
+            _log.info("job cancelled", extra={"job_id": job_id, "was": before.value})
         if before is JobStatus.QUEUED:
             self._waiting.less(job)
             self._tell_end(job, None)
-        run = self._runs.get(job_id)
+        run = self._runs.of(job_id)
         if before is JobStatus.RUNNING and run is not None:
             run.stop(self._grace_s)
         elif before is JobStatus.RUNNING:
@@ -259,11 +260,11 @@ class Dispatcher:
 
     def runs(self, job_id: str) -> bool:
         """Say whether a job runs here; its channel then tells all that happens to it."""
-        return job_id in self._runs
+        return self._runs.of(job_id) is not None
 
-    def newest(self, job: Job) -> Job:
+    def newest(self, job: J) -> J:
         """Return a job with the progress that is known here and not yet in the table."""
-        run = self._runs.get(job.id)
+        run = self._runs.of(job.id)
         if run is None or job.status is not JobStatus.RUNNING:
             return job
         return replace(job, progress=run.progress)
@@ -307,7 +308,7 @@ class Dispatcher:
     def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.
 
-        So a cancellation, which is committed after it, finds it in ``_runs``.
+        So a cancellation, which is committed after it, finds it among the runs.
         """
         job = claim.job
         kind = self._kinds[job.kind]
@@ -315,31 +316,35 @@ class Dispatcher:
         if at_once and self._reserve is not None and kind.at_once is not None:
             executor, work = self._reserve, kind.at_once
         channel = self._channels.open(job.id)
-        run = Run(job, claim.deadline, channel, job.progress, saved_at=time.monotonic(), at_once=at_once)
-        self._runs[job.id] = run
+        now = self._clock.now()
+        run = Run(job, claim.deadline, channel, job.progress, now, saved_at=time.monotonic(), at_once=at_once)
+        self._runs.add(run)
 
         def on_progress(progress: Progress) -> None:
             run.progress, run.unsaved = progress, True
-            channel.report(progress)
+            if run.killed_for != "gone":
+                channel.report(progress)
 
         if job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
-        left = None if claim.deadline is None else claim.deadline - time.time()
+        left = None if claim.deadline is None else claim.deadline - now
         run.execution = executor.submit(
             work,
             job.payload,
             time_left_s=left,
             on_progress=on_progress,
-            labels={**self._labels.get(job.id, {}), "job_id": job.id},
+            labels=job.labels,
         )
+        loop = asyncio.get_running_loop()
         if left is not None:
-            loop = asyncio.get_running_loop()
             run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
+        if kind.max_run_s is not None:
+            run.timers.append(loop.call_later(kind.max_run_s, run.stop, self._grace_s, "time"))
         return _spawn(self._finish(run, run.execution), self._finishing)
 
     async def _finish(self, run: Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
-        bind_contextvars(**self._labels.get(run.job.id, {}), job_id=run.job.id)
+        bind_contextvars(**run.job.labels)
         begun, took = time.monotonic(), None
         job: Job | None = None
         try:
@@ -356,20 +361,19 @@ class Dispatcher:
                 _log.warning("a job went on without attempt %d", run.job.attempt)
             elif job.status is JobStatus.SUCCEEDED and not run.at_once:
                 self._lanes.ran(job.lane, [took])
-        del self._runs[run.job.id]
+        self._runs.remove(run)
         if job is not None and job.status.finished:
             self._tell_end(job, took)
-        elif job is not None:
-            self._waiting.more(job, run.deadline)
         else:
-            # It goes on elsewhere: who listens has to look there.
+            if job is not None:
+                self._waiting.more(job, run.deadline)
+            # It goes on later, or elsewhere: who listens has to look there.
             run.channel.ring()
         if not run.at_once:
             self._give_back(run.job.lane)
 
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
-        self._labels.pop(job.id, None)
         self._channels.end(job)
         self._company.tell_ended(job.id)
         self._observer.ended(job, ran_s)

@@ -25,7 +25,7 @@ class QueueFull(JobError):
     def __init__(self, lane: str, limit: int, retry_after_s: float) -> None:
         super().__init__(
             f"the queue of {lane} jobs is full ({limit} waiting); "
-            f"it is expected to be worked off in {retry_after_s:.0f} s"
+            f"a place is expected to be free in {retry_after_s:.0f} s"
         )
         self.lane = lane
         self.limit = limit

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 
 from app.jobs.channel import rung
-from app.jobs.run import Run
+from app.jobs.run import Runs
 from app.jobs.store import JobStore
 from app.jobs.writer import Writer
 
@@ -27,7 +27,7 @@ class Housekeeping:
     store, writer
         The job table, and its writer.
     runs
-        Returns the jobs that run here.
+        The jobs that run here.
     look_after
         Called now and then, to give back jobs that nobody runs any more.
     retention_s
@@ -38,7 +38,7 @@ class Housekeeping:
         self,
         store: JobStore,
         writer: Writer,
-        runs: Callable[[], Iterable[Run]],
+        runs: Runs,
         look_after: Callable[[], Awaitable[None]],
         retention_s: float | None,
     ) -> None:
@@ -71,7 +71,7 @@ class Housekeeping:
 
     async def _save_progress(self) -> None:
         now = time.monotonic()
-        due = [run for run in self._runs() if run.unsaved and now - run.saved_at >= _SAVE_INTERVAL_S]
+        due = [run for run in self._runs if run.unsaved and now - run.saved_at >= _SAVE_INTERVAL_S]
         if not due:
             return
         for run in due:
@@ -84,7 +84,7 @@ class Housekeeping:
         """Delete ended jobs that are too old, some at a time, so that nobody waits long to write."""
         if self._retention_s is None:
             return
-        before, gone, last = time.time() - self._retention_s, 0, _EXPIRED_AT_ONCE
+        before, gone, last = self._store.clock.now() - self._retention_s, 0, _EXPIRED_AT_ONCE
         while last == _EXPIRED_AT_ONCE and not self._ended.is_set():
             last = await self._writer.write(self._store.expire, before, _EXPIRED_AT_ONCE)
             gone += last

@@ -15,8 +15,8 @@ _UNMEASURED_DURATION_S = 1.0
 class Lanes:
     """Counts the workers in use and the jobs that wait, lane by lane.
 
-    Trainings hold at most all workers but one; where there is only one, they share it. Interactive jobs
-    come first in both cases, then those of batches, which may hold all workers.
+    Trainings hold at most all workers but one, and so do the jobs of batches; where there is only one, they
+    share it. Interactive jobs come first in both cases, then those of batches.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ class Lanes:
     """
 
     def __init__(self, capacity: int) -> None:
-        self._workers: dict[Lane, int] = dict.fromkeys(LANES, capacity)
-        self._workers["training"] = max(1, capacity - 1)
+        self._workers: dict[Lane, int] = dict.fromkeys(LANES, max(1, capacity - 1))
+        self._workers["interactive"] = self._capacity = capacity
         self.running: dict[Lane, int] = dict.fromkeys(LANES, 0)
         self.waiting: dict[Lane, int] = dict.fromkeys(LANES, 0)
         self._durations: dict[Lane, deque[float]] = {
@@ -57,36 +57,40 @@ class Lanes:
         """Note how long jobs of the lane took."""
         self._durations[lane].extend(durations_s)
 
-    def time_to_work_off(
-        self, lane: Lane, waiting: int, running: Iterable[tuple[float, float | None]]
-    ) -> float:
-        """Return the seconds in which ``waiting`` jobs of the lane will have been started, at least 1.
+    def time_to_a_place(self, lane: Lane, running: Iterable[tuple[Lane, float, float | None]]) -> float:
+        """Return the seconds until one job of a lane in which others wait will have been started, at least 1.
 
         Parameters
         ----------
         lane
             The lane.
-        waiting
-            How many jobs wait.
         running
-            Of the jobs of the lane that run, for how long they have, and how long their time limit leaves
-            them if they have one. Who has run longer than others did is expected to go on for as long again.
+            Of the jobs that run, their lane, for how long they have, and how long their time limit leaves
+            them if they have one.
 
         Returns
         -------
         float
-            What is left of the one that ends first where no worker is free, and the mean of the last
-            durations and of what runs longer, times the jobs, over the workers that the lane can have.
+            What is left of the one that ends first among those for which the lane waits. Where a worker is
+            free, or soon will be, the mean of the lane's last durations over the workers that it can have.
         """
-        now = tuple(running)
-        ended = tuple(self._durations[lane])
-        mean = fmean(ended) if ended else _UNMEASURED_DURATION_S
-        rests = []
-        for ran_s, left_s in now:
-            rest = mean - ran_s if ran_s < mean else ran_s
-            rests.append(rest if left_s is None else min(rest, max(0.0, left_s)))
-        longer = [ran_s + rest for (ran_s, _), rest in zip(now, rests, strict=True) if ran_s > mean]
-        mean = max(mean, fmean([*ended, *longer])) if longer else mean
+        all_of_them = tuple(running)
+        own = [each for each in all_of_them if each[0] == lane]
         workers = self._workers[lane]
-        first = min(rests) if len(rests) >= workers else 0.0
-        return max(1.0, first + mean * waiting / workers)
+        if len(own) >= workers:
+            seconds = min(self._rest(*each) for each in own)
+        elif len(all_of_them) >= self._capacity:
+            seconds = min(self._rest(*each) for each in all_of_them)
+        else:
+            seconds = self._mean(lane) / workers
+        return max(1.0, seconds)
+
+    def _rest(self, lane: Lane, ran_s: float, left_s: float | None) -> float:
+        """Return how long a job that runs is expected to go on."""
+        mean = self._mean(lane)
+        # One that has run longer than others did is expected to go on for as long again.
+        rest = mean - ran_s if ran_s < mean else ran_s
+        return rest if left_s is None else min(rest, max(0.0, left_s))
+
+    def _mean(self, lane: Lane) -> float:
+        return fmean(self._durations[lane]) if self._durations[lane] else _UNMEASURED_DURATION_S

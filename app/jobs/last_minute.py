@@ -31,17 +31,21 @@ class LastMinute:
     ----------
     answer
         Answers a job if it still waits, and returns how many seconds that took; None if it did not wait.
+    now
+        The clock that deadlines are by.
     """
 
-    def __init__(self, answer: Callable[[str], Awaitable[float | None]]) -> None:
-        self._answer = answer
+    def __init__(
+        self, answer: Callable[[str], Awaitable[float | None]], now: Callable[[], float] = time.time
+    ) -> None:
+        self._answer, self._now = answer, now
         self._deadlines: dict[str, float] = {}
         self._took: deque[float] = deque(maxlen=_REMEMBERED)
         self._changed = asyncio.Event()
         self._ended = False
 
     def watch(self, job_id: str, deadline: float) -> None:
-        """Take note of a job that waits, and when its time is up, in seconds since 1970."""
+        """Take note of a job that waits, and when its time is up."""
         self._deadlines[job_id] = deadline
         self._changed.set()
 
@@ -66,7 +70,7 @@ class LastMinute:
             if not self._deadlines:
                 await self._changed.wait()
                 continue
-            in_s = latest_start(list(self._deadlines.values()), self._took) - time.time()
+            in_s = latest_start(list(self._deadlines.values()), self._took) - self._now()
             if in_s > 0:
                 await rung(self._changed, min(in_s, _LONGEST_LOOK_S))
                 continue

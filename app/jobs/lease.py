@@ -14,9 +14,8 @@ import sqlalchemy as sa
 
 from app.jobs.model import JobStatus
 from app.jobs.reading import Database
-from app.jobs.tables import jobs, owners
+from app.jobs.tables import DATABASE_NOW, jobs, owners
 
-_NOW = sa.cast(sa.extract("epoch", sa.func.clock_timestamp()), sa.Double)
 _SHOWS_A_LEASE = 5
 _FORGOTTEN_LEASES = 1000
 
@@ -72,10 +71,10 @@ class Lease:
         begun = self._clock()
         with self._database.write() as connection:
             seen = connection.execute(
-                sa.update(owners).where(owners.c.owner == self._owner).values(seen_at=_NOW)
+                sa.update(owners).where(owners.c.owner == self._owner).values(seen_at=DATABASE_NOW)
             )
             if not seen.rowcount:
-                connection.execute(sa.insert(owners).values(owner=self._owner, seen_at=_NOW))
+                connection.execute(sa.insert(owners).values(owner=self._owner, seen_at=DATABASE_NOW))
             rows = connection.execute(
                 sa.select(jobs.c.id, jobs.c.attempt, jobs.c.cancel_requested).where(
                     jobs.c.status == JobStatus.RUNNING, jobs.c.owner == self._owner
@@ -91,11 +90,11 @@ class Lease:
         if owner == self._owner or self._clock() < self._judges_from:
             return True
         with self._database.read() as connection:
-            age = connection.scalar(sa.select(_NOW - owners.c.seen_at).where(owners.c.owner == owner))
+            age = connection.scalar(sa.select(DATABASE_NOW - owners.c.seen_at).where(owners.c.owner == owner))
         return age is not None and age <= self._lease_s
 
     def end(self) -> None:
         """Remove this owner, and those that died so long ago that no job can be theirs."""
         with self._database.write() as connection:
-            forgotten = owners.c.seen_at < _NOW - _FORGOTTEN_LEASES * self._lease_s
+            forgotten = owners.c.seen_at < DATABASE_NOW - _FORGOTTEN_LEASES * self._lease_s
             connection.execute(sa.delete(owners).where(sa.or_(owners.c.owner == self._owner, forgotten)))

@@ -19,7 +19,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, MutableSequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from types import MappingProxyType
@@ -129,22 +129,24 @@ class _Worker:
 
     async def warm_up(self) -> None:
         """Start the process and wait until it is warm."""
-        await asyncio.to_thread(self._start)
+        # No thread waits for it: all the warm-ups together could keep those that requests need.
+        pid = asyncio.wrap_future(await asyncio.to_thread(self._start))
+        self.pid = await pid
+        if self._doomed:
+            self.kill()
+        await asyncio.wrap_future(self.pool.submit(self._warm_up))
 
     async def stay(self) -> None:
         """Wait until the process is gone."""
         await self.gone.wait()
 
-    def _start(self) -> None:
+    def _start(self) -> Future[int]:
         with _environment(self._environment):
             pid = self.pool.submit(os.getpid)
         # Once only the worker has the other end, the pipe closes when the worker dies.
         self._their_end.close()
         self._reader.start()
-        self.pid = pid.result()
-        if self._doomed:
-            self.kill()
-        self.pool.submit(self._warm_up).result()
+        return pid
 
     def begin(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
         """Route the progress of the work with this serial number."""

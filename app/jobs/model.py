@@ -11,10 +11,12 @@ Every dispatch counts ``attempt`` up, so a result of an earlier dispatch can be 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -66,12 +68,13 @@ class Progress:
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object."""
-        return asdict(self)
+        # Not copied: nobody changes a plan, and it may have a hundred thousand numbers.
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One job as it is in the table, with the newest progress.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobSummary:
+    """One job without what it works on and what came of it, which may be large.
 
     Attributes
     ----------
@@ -81,10 +84,6 @@ class Job:
         What is done, and the lane it waits in.
     status
         Where it is in its life.
-    payload
-        What the work function gets.
-    result
-        What the work function returned; a cancelled job has one if its work stopped by itself.
     error
         ``{"code", "detail", "violations": [{"pointer", "detail"}], "details": {}}`` of a failed job.
     progress
@@ -95,14 +94,14 @@ class Job:
         UTC; ``started_at`` is of the newest attempt.
     has_artifact
         Whether the work left bytes behind.
+    request_id, key_id
+        The request that asked for it, and the API key of that request; None where there is none.
     """
 
     id: str
     kind: str
     status: JobStatus
     lane: Lane
-    payload: dict[str, Any]
-    result: dict[str, Any] | None
     error: dict[str, Any] | None
     progress: Progress
     attempt: int
@@ -110,13 +109,37 @@ class Job:
     started_at: datetime | None
     finished_at: datetime | None
     has_artifact: bool
+    request_id: str | None = None
+    key_id: str | None = None
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What the lines have that are logged while it is worked on, ids by their names."""
+        given = {"request_id": self.request_id, "key_id": self.key_id, "job_id": self.id}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job(JobSummary):
+    """One job as it is in the table, with the newest progress.
+
+    Attributes
+    ----------
+    payload
+        What the work function gets.
+    result
+        What the work function returned; a cancelled job has one if its work stopped by itself.
+    """
+
+    payload: dict[str, Any]
+    result: dict[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True)
 class JobPage:
-    """Jobs, newest first; ``next_cursor`` is None on the last page."""
+    """Jobs without their plans, newest first; ``next_cursor`` is None on the last page."""
 
-    jobs: tuple[Job, ...]
+    jobs: tuple[JobSummary, ...]
     next_cursor: str | None
 
 
@@ -143,7 +166,7 @@ class Load:
     restarts: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class JobEvent:
     """One event of a job's stream.
 
@@ -160,6 +183,11 @@ class JobEvent:
     id: int
     name: Literal["progress", "end"]
     data: dict[str, Any]
+
+    @cached_property
+    def text(self) -> str:
+        """The data as JSON, written once however many listen."""
+        return json.dumps(self.data)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +240,9 @@ class JobKind:
     at_once
         As ``work``, but light and quick: answers a job that still waits when its time limit ends. None: such
         a job waits for a worker all the same.
+    max_run_s
+        How long its work may take, in seconds, whatever its time limit; then it is stopped as by that. None:
+        as long as it likes.
     """
 
     name: str
@@ -220,3 +251,4 @@ class JobKind:
     on_success: Callable[[Connection, Job, WorkResult], dict[str, Any]] | None = None
     dropped_fields: frozenset[str] = frozenset()
     at_once: str | None = None
+    max_run_s: float | None = None

@@ -10,10 +10,11 @@ from typing import Protocol
 import sqlalchemy as sa
 from sqlalchemy import Connection
 
-from app.jobs.errors import InvalidCursor
-from app.jobs.model import Job, JobPage, JobStatus, Lane
-from app.jobs.tables import artifacts, jobs
-from app.jobs.transitions import find, job_of, select_jobs
+from app.jobs.clock import Clock
+from app.jobs.errors import InvalidCursor, JobNotFound
+from app.jobs.model import Job, JobPage, JobStatus, JobSummary, Lane
+from app.jobs.tables import DATABASE_NOW, artifacts, jobs
+from app.jobs.transitions import find, job_of, select_small, select_summaries, summary_of
 
 
 class Announcements(Protocol):
@@ -31,6 +32,12 @@ class Database(Protocol):
 
     shared: bool
     """Whether several services may work on it; otherwise transactions that write take turns."""
+
+    def occupy(self) -> None:
+        """Keep other services off, where it is not shared."""
+
+    def vacate(self) -> None:
+        """Let another service have it."""
 
     def write(self) -> AbstractContextManager[Connection]:
         """Open a write transaction, committed at its end and rolled back by an exception."""
@@ -55,15 +62,28 @@ class JobReader:
     ----------
     database
         Where the tables are.
+    clock
+        Of the service.
 
     Attributes
     ----------
-    database
+    database, clock
         The same.
     """
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Database, clock: Clock) -> None:
         self.database = self._database = database
+        self.clock = clock
+
+    def _now(self, connection: Connection) -> float:
+        """Return the time by the clock that all who write to the table share, in seconds since 1970."""
+        if not self._database.shared:
+            return self.clock.now()
+        return float(connection.execute(sa.select(DATABASE_NOW)).scalar_one())
+
+    def _ahead(self, connection: Connection) -> float:
+        """Return how many seconds the service's clock is ahead of the one that the table's times are by."""
+        return self.clock.now() - self._now(connection) if self._database.shared else 0.0
 
     def get(self, job_id: str) -> Job:
         """Return a job.
@@ -76,15 +96,48 @@ class JobReader:
         with self._database.read() as connection:
             return job_of(find(connection, job_id))
 
-    def page(self, limit: int, cursor: str | None) -> JobPage:
+    def look(self, job_id: str) -> JobSummary:
+        """Return a job without its payload and result.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self._database.read() as connection:
+            row = connection.execute(select_summaries.where(jobs.c.id == job_id)).mappings().first()
+        if row is None:
+            raise JobNotFound(job_id)
+        return summary_of(row)
+
+    def result_text(self, job_id: str) -> str | None:
+        """Return a job's result as JSON, as it is stored; None without one."""
+        with self._database.read() as connection:
+            text: str | None = connection.scalar(
+                sa.select(sa.cast(jobs.c.result, sa.Text)).where(jobs.c.id == job_id)
+            )
+            return text
+
+    def page(self, limit: int, cursor: str | None, status: JobStatus | None = None) -> JobPage:
         """Return jobs, newest first, after the cursor; new jobs do not shift the pages that follow.
+
+        Parameters
+        ----------
+        limit
+            How many at most.
+        cursor
+            Of the page before; None for the first.
+        status
+            Only the jobs of that status; None: all.
 
         Raises
         ------
         InvalidCursor
             If no page gave out such a cursor.
         """
-        statement = select_jobs.order_by(jobs.c.number.desc()).limit(limit + 1)
+        statement = select_small.order_by(jobs.c.number.desc()).limit(limit + 1)
+        if status is not None:
+            statement = statement.where(jobs.c.status == status)
         if cursor is not None:
             if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
                 raise InvalidCursor(cursor)
@@ -93,7 +146,7 @@ class JobReader:
             rows = connection.execute(statement).mappings().all()
         more = len(rows) > limit
         rows = rows[:limit]
-        return JobPage(tuple(job_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
+        return JobPage(tuple(summary_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
 
     def artifact(self, job_id: str) -> bytes | None:
         """Return the bytes that a job left behind; None if it left none.
@@ -103,12 +156,13 @@ class JobReader:
         JobNotFound
             If no job has that id.
         """
+        left = sa.select(jobs.c.id, artifacts.c.data).outerjoin(artifacts, artifacts.c.job_id == jobs.c.id)
         with self._database.read() as connection:
-            find(connection, job_id)
-            data: bytes | None = connection.scalar(
-                sa.select(artifacts.c.data).where(artifacts.c.job_id == job_id)
-            )
-            return data
+            row = connection.execute(left.where(jobs.c.id == job_id)).first()
+        if row is None:
+            raise JobNotFound(job_id)
+        data: bytes | None = row.data
+        return data
 
     def waiting(self) -> dict[Lane, int]:
         """Return how many jobs wait in each lane that has any."""
@@ -121,14 +175,15 @@ class JobReader:
             return {row.lane: row.jobs for row in rows}
 
     def deadlines(self) -> list[tuple[str, str, float]]:
-        """Return id, kind and deadline (seconds since 1970) of the waiting jobs that have one."""
+        """Return id, kind and deadline (by the service's clock) of the waiting jobs that have one."""
         with self._database.read() as connection:
+            ahead = self._ahead(connection)
             rows = connection.execute(
                 sa.select(jobs.c.id, jobs.c.kind, jobs.c.deadline).where(
                     jobs.c.status == JobStatus.QUEUED, jobs.c.deadline.is_not(None)
                 )
             )
-            return [(row.id, row.kind, row.deadline) for row in rows]
+            return [(row.id, row.kind, row.deadline + ahead) for row in rows]
 
     def recent_durations(self, lane: Lane, limit: int) -> list[float]:
         """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""

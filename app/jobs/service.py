@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from app.jobs.channel import Channels, rung
+from app.jobs.clock import Clock
 from app.jobs.dispatcher import Dispatcher
 from app.jobs.executor import Executor
+from app.jobs.listening import Listening
 from app.jobs.model import (
     LANES,
     Idempotency,
@@ -19,20 +22,20 @@ from app.jobs.model import (
     JobKind,
     JobPage,
     JobStatus,
+    JobSummary,
     Lane,
     Load,
-    Progress,
 )
 from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
 from app.jobs.reading import Database
 from app.jobs.store import JobStore
 
-# Who waits for a job that another process runs may miss what is told of its end, and looks at the table.
+# A waiter may miss the news of a job that another process runs, and looks at the table.
 _LOOK_AGAIN_S = 5.0
 _PLACES = 64
-# Its progress is told by nobody: who wants to see that looks as often as it is stored.
-_LOOK_FOR_PROGRESS_S = 1.0
+
+_log = logging.getLogger(__name__)
 
 
 class JobService:
@@ -40,7 +43,8 @@ class JobService:
 
     A job is committed before :meth:`submit` returns, and from then on it is finished once, whatever dies:
     what runs when its worker or this process dies waits again, ``max_attempts`` times. One service at a
-    time works on an SQLite file; on PostgreSQL several share the jobs, on one machine or many.
+    time works on an SQLite file, others are refused; on PostgreSQL several share the jobs, on one machine or
+    many.
 
     Parameters
     ----------
@@ -83,8 +87,11 @@ class JobService:
     ) -> None:
         owner = new_owner()
         dropped_fields = {kind.name: kind.dropped_fields for kind in kinds}
-        self._store = JobStore(database, owner, max_attempts, dropped_fields)
+        self._database = database
+        self._store = JobStore(database, owner, max_attempts, dropped_fields, Clock())
         self._channels = Channels()
+        # Where nobody else can change a job, nothing happens to it that its channel does not tell.
+        self._look_again_s = _LOOK_AGAIN_S if database.shared else None
         self._dispatcher = Dispatcher(
             self._store,
             owner,
@@ -100,26 +107,46 @@ class JobService:
             observer=observer or NoObserver(),
             lease_s=lease_s,
         )
-        self._stopping = False
-        self._stopped = False
+        self._listening = Listening(self._store, self._dispatcher, self._channels)
+        self._stopping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work.
 
         Workers start in the background; jobs wait until one is warm, see :meth:`load`.
-        """
-        await self._dispatcher.start()
 
-    async def stop(self, grace_s: float) -> None:
+        Raises
+        ------
+        policy_store.errors.DatabaseOccupied
+            If another service works on the database, which is not shared.
+        """
+        await asyncio.to_thread(self._database.occupy)
+        try:
+            await self._dispatcher.start()
+        except BaseException:
+            self._database.vacate()
+            raise
+
+    def begin_stop(self, grace_s: float) -> None:
         """Take no new jobs, end event streams, and let what runs go on for ``grace_s`` seconds at most.
 
         What still runs then goes back to the queue, without loss of an attempt; the next start goes on with
-        it and with what waits. Waiting callers get their job as it is then.
+        it and with what waits. Callers who wait for a job that does not run get it at once, the others as it
+        is then. Only the first call has an effect.
         """
-        self._stopping = True
-        self._channels.ring()
+        if self._stopping is None:
+            self._stopping = asyncio.create_task(self._stop(grace_s))
+            self._listening.end()
+
+    async def stop(self, grace_s: float) -> None:
+        """Stop as :meth:`begin_stop` does, unless that was called, and wait until that is done."""
+        self.begin_stop(grace_s)
+        assert self._stopping is not None
+        await self._stopping
+
+    async def _stop(self, grace_s: float) -> None:
         await self._dispatcher.stop(grace_s)
-        self._stopped = True
+        self._database.vacate()
         self._channels.ring()
 
     async def submit(
@@ -172,16 +199,43 @@ class JobService:
         """
         return self._dispatcher.newest(await asyncio.to_thread(self._store.get, job_id))
 
-    async def list(self, limit: int, cursor: str | None = None) -> JobPage:
+    async def look(self, job_id: str) -> JobSummary:
+        """Return a job with its newest progress, without its payload and result.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        self._channels.follow(job_id)
+        return await self._look(job_id)
+
+    async def _look(self, job_id: str) -> JobSummary:
+        return self._dispatcher.newest(await asyncio.to_thread(self._store.look, job_id))
+
+    async def result_text(self, job_id: str) -> str | None:
+        """Return a job's result as JSON, as it is stored; None without one."""
+        return await asyncio.to_thread(self._store.result_text, job_id)
+
+    async def list(self, limit: int, cursor: str | None = None, status: JobStatus | None = None) -> JobPage:
         """Return at most ``limit`` jobs, newest first, from the cursor of the page before.
+
+        Parameters
+        ----------
+        limit, cursor
+            How many, and where from; None: from the newest.
+        status
+            Only jobs of that status; None: all.
 
         Raises
         ------
         InvalidCursor
             If no page gave out such a cursor.
         """
-        page = await asyncio.to_thread(self._store.page, limit, cursor)
-        return replace(page, jobs=tuple(self._dispatcher.newest(job) for job in page.jobs))
+        page = await asyncio.to_thread(self._store.page, limit, cursor, status)
+        newest = (self._dispatcher.newest(job) for job in page.jobs)
+        plain = (replace(job, progress=replace(job.progress, assignment=None)) for job in newest)
+        return replace(page, jobs=tuple(plain))
 
     async def artifact(self, job_id: str) -> bytes | None:
         """Return the bytes that a job's work left; None if it left none.
@@ -208,13 +262,19 @@ class JobService:
         """
         return await self._dispatcher.cancel(job_id)
 
+    async def abandon(self, job_id: str) -> None:
+        """Cancel a job whose client has gone, unless somebody else has asked for it or the service stops."""
+        if self._stopping is None and not self._channels.open(job_id).followed:
+            _log.info("the client of a job has gone", extra={"job_id": job_id})
+            await self.cancel(job_id)
+
     async def wait(self, job_id: str, timeout_s: float | None) -> Job:
         """Wait until a job is finished, for ``timeout_s`` at most (None: for ever), and return it.
 
         Returns
         -------
         Job
-            Unfinished if the time ran out or the service stopped.
+            Unfinished if the time ran out or the service stops and the job does not run.
 
         Raises
         ------
@@ -225,49 +285,58 @@ class JobService:
         channel = self._channels.open(job_id)
         while True:
             bell = channel.changed
-            if channel.ended is None and not self._dispatcher.runs(job_id):
-                job = await self.get(job_id)
-                if job.status.finished:
-                    channel.catch_up(job)
-            if channel.ended is not None:
-                return channel.ended
-            left = _LOOK_AGAIN_S if end is None else min(_LOOK_AGAIN_S, end - time.monotonic())
-            if left <= 0 or self._stopped:
+            if not channel.over.is_set() and not self._dispatcher.runs(job_id):
+                summary = await self._look(job_id)
+                if summary.status.finished:
+                    return await self.get(job_id)
+            if channel.over.is_set():
+                return channel.ended or await self.get(job_id)
+            left = None if end is None else end - time.monotonic()
+            in_vain = self._stopping is not None and not self._dispatcher.runs(job_id)
+            if in_vain or (left is not None and left <= 0):
                 return await self.get(job_id)
-            await rung(bell, left)
+            pauses = [seconds for seconds in (left, self._look_again_s) if seconds is not None]
+            await rung(bell, min(pauses, default=None))
 
-    async def events(self, job_id: str, after: int = 0) -> AsyncIterator[JobEvent]:
-        """Yield a job's events with ids larger than ``after``: what is remembered, then what happens.
+    async def wait_for_client(
+        self, job_id: str, timeout_s: float | None, gone: Coroutine[Any, Any, object]
+    ) -> Job | None:
+        """Wait as :meth:`wait` does for a client that has nothing to come again with.
 
-        Ends after the ``"end"`` event, or when the service begins to stop.
+        Parameters
+        ----------
+        job_id, timeout_s
+            As there.
+        gone
+            Returns when the client has gone.
 
-        Raises
-        ------
-        JobNotFound
-            If no job has that id.
+        Returns
+        -------
+        Job or None
+            None: the client has gone, and the job is cancelled unless somebody else has asked for it.
         """
-        seen: Progress | None = None
-        channel = self._channels.open(job_id)
-        while True:
-            bell = channel.changed
-            elsewhere = channel.ended is None and not self._dispatcher.runs(job_id)
-            if elsewhere:
-                job = await self.get(job_id)
-                # While that was read, it may have begun to run here, or what is read may be of before.
-                elsewhere = channel.ended is None and not self._dispatcher.runs(job_id)
-                if elsewhere and job.status.finished:
-                    channel.catch_up(job)
-                elif elsewhere and job.status is JobStatus.RUNNING:
-                    if job.progress not in (seen, channel.progress):
-                        channel.report(job.progress)
-                    seen = job.progress
-            ended = channel.ended is not None
-            for event in channel.since(after):
-                after = event.id
-                yield event
-            if ended or self._stopping:
-                return
-            await rung(bell, _LOOK_FOR_PROGRESS_S if elsewhere else _LOOK_AGAIN_S)
+        channel = self._channels.open(job_id)  # open until here is known who else has asked
+        waiting, leaving = asyncio.create_task(self.wait(job_id, timeout_s)), asyncio.create_task(gone)
+        try:
+            await asyncio.wait((waiting, leaving), return_when=asyncio.FIRST_COMPLETED)
+            if waiting.done():
+                return waiting.result()
+            await self.abandon(job_id)
+            return None
+        finally:
+            waiting.cancel()
+            leaving.cancel()
+            del channel
+
+    def events(
+        self, job_id: str, after: int = 0, allowed: Callable[[], Awaitable[bool]] | None = None
+    ) -> AsyncGenerator[JobEvent]:
+        """Listen to a job, see :meth:`app.jobs.listening.Listening.events`."""
+        return self._listening.events(job_id, after, allowed)
+
+    def has_told_all(self, job: JobSummary, after: int) -> bool:
+        """Say whether a job has ended, and ``after`` is the id of its last event."""
+        return self._listening.has_told_all(job, after)
 
     def load(self) -> Load:
         """Return how busy the service is; it answers quickly once a worker is ready."""

@@ -59,12 +59,12 @@ class Settling:
         if run.killed_for == "stop":
             return await surely(self._store.release, job.id, job.attempt, progress)
         if run.killed_for == "time":
-            if self._kinds[job.kind].at_once is not None and not run.at_once:
+            if self._kinds[job.kind].at_once is not None and not run.at_once and not run.asked_to_stop:
                 # It waits again, with its time up: there is an answer for those.
                 return await surely(self._store.release, job.id, job.attempt, progress)
             error = failure(
                 "time-limit-exceeded",
-                f"the work did not stop within {self._grace_s:g} s after its time limit, and was ended",
+                f"the work did not stop within {self._grace_s:g} s after its time was up, and was ended",
             )
             return await surely(self._store.fail, job.id, job.attempt, error, progress)
         _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)

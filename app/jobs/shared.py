@@ -10,14 +10,13 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Mapping
 
 from app.jobs.channel import Channels, rung
 from app.jobs.company import Alone, Company, Reactions
 from app.jobs.lease import Held, Lease
 from app.jobs.model import LANES, Lane
 from app.jobs.reading import Announcements, Database
-from app.jobs.run import Run
+from app.jobs.run import Runs
 from app.jobs.writer import Writer
 
 _CHANNEL = "allocator_jobs"
@@ -35,7 +34,7 @@ class Shared:
     writer
         Whose thread brings signs of life to the table.
     runs
-        The jobs that run here, by their id.
+        The jobs that run here.
     channels
         Who listens here to which job.
     """
@@ -48,7 +47,7 @@ class Shared:
         owner: str,
         lease_s: float,
         writer: Writer,
-        runs: Mapping[str, Run],
+        runs: Runs,
         channels: Channels,
     ) -> None:
         self._database = database
@@ -113,8 +112,8 @@ class Shared:
             case "ended":
                 reactions.forget(of)
                 self._channels.look_again(of)
-            case "cancelled" if of in self._runs:
-                reactions.stop(self._runs[of])
+            case "cancelled" if (run := self._runs.of(of)) is not None:
+                reactions.stop(run)
             case "":
                 # Something may have been missed.
                 for lane in LANES:
@@ -140,19 +139,20 @@ class Shared:
         They differ where a connection was cut in the midst of a commit, of which nobody knows then whether
         it was made, and where this service was taken for dead.
         """
-        before = dict(self._runs)
-        held: Mapping[str, Held] = await self._writer.write(self._lease.show)
-        for job_id, run in before.items():
-            mine = held.get(job_id)
-            if self._runs.get(job_id) is not run:
+        before = list(self._runs)
+        held: dict[str, Held] = await self._writer.write(self._lease.show)
+        for run in before:
+            mine = held.get(run.job.id)
+            if run not in self._runs:
                 continue
             if mine is None or mine.attempt != run.job.attempt:
-                _log.warning("a job was given to another service", extra={"job_id": job_id})
+                _log.warning("a job was taken from this service", extra={"job_id": run.job.id})
                 run.kill("gone")
             elif mine.cancel_requested:
                 reactions.stop(run)
+        known = {run.job.id for run in before}
         for job_id, mine in held.items():
-            if job_id not in self._runs and job_id not in before:
+            if job_id not in known and self._runs.of(job_id) is None:
                 await reactions.give_back(job_id, mine.attempt)
 
 
@@ -161,7 +161,7 @@ def company_on(
     owner: str,
     lease_s: float,
     writer: Writer,
-    runs: Mapping[str, Run],
+    runs: Runs,
     channels: Channels,
 ) -> Company:
     """Return whom an owner shares a database with: nobody, or others; see :class:`Shared`."""

@@ -11,7 +11,6 @@ The methods block on the disk (a commit is one fsync): call them from a thread, 
 
 from __future__ import annotations
 
-import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
+from app.jobs.clock import Clock
 from app.jobs.errors import IdempotencyMismatch, QueueFull
 from app.jobs.failure import failure
 from app.jobs.model import (
@@ -37,10 +37,13 @@ from app.jobs.model import (
 from app.jobs.reading import Database, JobReader
 from app.jobs.tables import artifacts, idempotency_keys, jobs
 from app.jobs.transitions import (
+    Claim,
+    claim_of,
     end,
     find,
     find_attempt,
     job_of,
+    progress_columns,
     progress_of,
     queued_of_other_kinds,
     requeue,
@@ -62,14 +65,6 @@ class QueueLimit:
     retry_after_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A job that was taken to be run, and when its time is up (seconds since 1970)."""
-
-    job: Job
-    deadline: float | None
-
-
 class JobStore(JobReader):
     """Reads and writes the job table on behalf of one owner.
 
@@ -83,6 +78,8 @@ class JobStore(JobReader):
         How often a job may be lost with its worker or its owner; then it fails.
     dropped_fields
         By kind of job, the fields of the payload that go when it ends.
+    clock
+        Of the service; None: a new one.
     """
 
     def __init__(
@@ -91,8 +88,9 @@ class JobStore(JobReader):
         owner: str,
         max_attempts: int,
         dropped_fields: Mapping[str, frozenset[str]] = MappingProxyType({}),
+        clock: Clock | None = None,
     ) -> None:
-        super().__init__(database)
+        super().__init__(database, clock or Clock())
         self._owner = owner
         self._max_attempts = max_attempts
         self._dropped_fields = dropped_fields
@@ -110,6 +108,8 @@ class JobStore(JobReader):
         limit: QueueLimit,
         time_limit_s: float | None = None,
         idempotency: Idempotency | None = None,
+        request_id: str | None = None,
+        key_id: str | None = None,
     ) -> tuple[Claim, bool]:
         """Add a job, or find the one that was added with the same idempotency key.
 
@@ -117,6 +117,8 @@ class JobStore(JobReader):
         ----------
         run_now
             A worker is reserved: the job begins as running, which saves the transaction that takes it.
+        request_id, key_id
+            The request that asks for it, and its API key.
 
         Returns
         -------
@@ -130,7 +132,6 @@ class JobStore(JobReader):
         QueueFull
             If the job would have to wait and its lane has no place left.
         """
-        now = time.time()
         with self._database.write() as connection:
             if idempotency is not None:
                 self._database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
@@ -146,6 +147,7 @@ class JobStore(JobReader):
                 )
                 if (waiting or 0) >= limit.places:
                     raise QueueFull(kind.lane, limit.places, limit.retry_after_s)
+            now = self._now(connection)
             row: dict[str, Any] = {
                 "id": uuid.uuid4().hex,
                 "kind": kind.name,
@@ -154,7 +156,7 @@ class JobStore(JobReader):
                 "payload": payload,
                 "result": None,
                 "error": None,
-                "progress": Progress().as_json(),
+                **progress_columns(Progress()),
                 "attempt": 1 if run_now else 0,
                 "losses": 0,
                 "owner": self._owner if run_now else None,
@@ -163,6 +165,8 @@ class JobStore(JobReader):
                 "created_at": now,
                 "started_at": now if run_now else None,
                 "finished_at": None,
+                "request_id": request_id,
+                "key_id": key_id,
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
@@ -174,7 +178,8 @@ class JobStore(JobReader):
                         job_id=row["id"],
                     )
                 )
-        return Claim(job_of({**row, "has_artifact": False}), row["deadline"]), True
+            ahead = self._ahead(connection)
+        return claim_of(row, ahead), True
 
     def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
         found = connection.execute(
@@ -187,7 +192,7 @@ class JobStore(JobReader):
         if found.body_hash != idempotency.body_hash:
             raise IdempotencyMismatch(idempotency.key, found.job_id)
         row = connection.execute(select_jobs.where(jobs.c.id == found.job_id)).mappings().one()
-        return Claim(job_of(row), row["deadline"])
+        return claim_of(row, self._ahead(connection))
 
     def claim(self, lane: Lane) -> Claim | None:
         """Take the job of a lane that has waited longest; None if none waits."""
@@ -207,20 +212,22 @@ class JobStore(JobReader):
         return self._take(jobs.c.id == job_id)
 
     def _take(self, which: sa.ColumnElement[bool]) -> Claim | None:
-        take = (
-            sa.update(jobs)
-            .where(which, jobs.c.status == JobStatus.QUEUED)
-            .values(
-                status=JobStatus.RUNNING,
-                attempt=jobs.c.attempt + 1,
-                owner=self._owner,
-                started_at=time.time(),
-            )
-            .returning(jobs)
-        )
         with self._database.write() as connection:
+            now = self._now(connection)
+            take = (
+                sa.update(jobs)
+                .where(which, jobs.c.status == JobStatus.QUEUED)
+                .values(
+                    status=JobStatus.RUNNING,
+                    attempt=jobs.c.attempt + 1,
+                    owner=self._owner,
+                    # An earlier process may have had another idea of the time.
+                    started_at=sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now),
+                )
+                .returning(jobs)
+            )
             row = connection.execute(take).mappings().first()
-        return None if row is None else Claim(job_of({**row, "has_artifact": False}), row["deadline"])
+            return None if row is None else claim_of(row, self._ahead(connection))
 
     def succeed(
         self, job_id: str, attempt: int, work: WorkResult, progress: Progress, on_success: OnSuccess | None
@@ -288,7 +295,7 @@ class JobStore(JobReader):
         self, connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
     ) -> Job:
         dropped = self._dropped_fields.get(row["kind"], frozenset())
-        return end(connection, row, status, progress, dropped=dropped, **values)
+        return end(connection, row, status, progress, self._now(connection), dropped=dropped, **values)
 
     def recover(self, kinds: Iterable[str], alive: Callable[[str], bool]) -> list[Job]:
         """Give back the running jobs of owners that are dead, and fail jobs of kinds that are no more.
@@ -330,7 +337,7 @@ class JobStore(JobReader):
                         jobs.c.attempt == attempt,
                         jobs.c.status == JobStatus.RUNNING,
                     )
-                    .values(progress=progress.as_json())
+                    .values(progress_columns(progress))
                 )
 
     def cancel(self, job_id: str) -> tuple[Job, JobStatus]:

@@ -10,6 +10,9 @@ import sqlalchemy as sa
 
 metadata = sa.MetaData()
 
+DATABASE_NOW = sa.cast(sa.extract("epoch", sa.func.clock_timestamp()), sa.Double)
+"""The time by the clock of a database that several services share."""
+
 jobs = sa.Table(
     "jobs",
     metadata,
@@ -33,7 +36,13 @@ jobs = sa.Table(
     sa.Column("created_at", sa.Double, nullable=False),
     sa.Column("started_at", sa.Double),
     sa.Column("finished_at", sa.Double),
+    # The id of the request that it came with, and of the API key of that request.
+    sa.Column("request_id", sa.String(128)),
+    sa.Column("key_id", sa.String(64)),
+    # The best plan so far, apart from the rest of the progress because it may be large.
+    sa.Column("assignment", sa.JSON(none_as_null=True)),
     sa.Index("ix_jobs_finished_at", "finished_at"),
+    sa.Index("ix_jobs_status_number", "status", "number"),
     sa.Index("ix_jobs_status_lane_number", "status", "lane", "number"),
     sqlite_autoincrement=True,
 )

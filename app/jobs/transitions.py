@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Set
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -11,11 +11,24 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
 from app.jobs.errors import JobNotFound
-from app.jobs.model import Job, JobStatus, Progress
+from app.jobs.model import Job, JobStatus, JobSummary, Progress
 from app.jobs.tables import artifacts, jobs
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A job that was taken to be run, and when its time is up by the service's clock."""
+
+    job: Job
+    deadline: float | None
+
 
 has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
 select_jobs = sa.select(jobs, has_artifact)
+# Payloads, results and plans may have a megabyte each.
+_LARGE = {"payload", "result", "assignment"}
+select_small = sa.select(*(column for column in jobs.c if column.name not in _LARGE), has_artifact)
+select_summaries = select_small.add_columns(jobs.c.assignment)
 # What is read in order to be changed is locked, where a database does not let writers take turns.
 select_jobs_to_change = select_jobs.with_for_update(of=jobs)
 
@@ -58,13 +71,16 @@ def end(
     row: RowMapping,
     status: JobStatus,
     progress: Progress,
+    now: float,
     *,
     result: dict[str, Any] | None = None,
     error: dict[str, Any] | None = None,
     dropped: Set[str] = frozenset(),
 ) -> Job:
     """Move a job to a final state, its payload without the dropped fields."""
-    values: dict[str, Any] = {"result": result, "error": error, "finished_at": time.time()}
+    # An earlier process may have had another idea of the time.
+    finished_at = max(now, row["started_at"] or row["created_at"])
+    values: dict[str, Any] = {"result": result, "error": error, "finished_at": finished_at}
     if dropped:
         values["payload"] = {name: value for name, value in row["payload"].items() if name not in dropped}
     return change(connection, row, status, progress, **values)
@@ -79,7 +95,7 @@ def change(
     connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
 ) -> Job:
     """Move a job on from the state, and the attempt, in which it was read."""
-    stored = {"status": status, "progress": progress.as_json(), **values}
+    stored = {"status": status, **progress_columns(progress), **values}
     left = (
         connection.execute(
             sa.update(jobs)
@@ -94,9 +110,16 @@ def change(
     return job_of({**row, **stored, **left})
 
 
+def progress_columns(progress: Progress) -> dict[str, Any]:
+    """Return the columns of a progress by their names."""
+    fields = progress.as_json()
+    return {"assignment": fields.pop("assignment"), "progress": fields}
+
+
 def progress_of(row: RowMapping | dict[str, Any]) -> Progress:
-    """Return the stored progress of a row."""
-    return Progress(**row["progress"])
+    """Return the stored progress of a row, with its plan if that was selected."""
+    # Jobs of earlier versions have their plan in the other column.
+    return Progress(**{"assignment": row.get("assignment"), **row["progress"]})
 
 
 def _time(seconds: float | None) -> datetime | None:
@@ -105,18 +128,33 @@ def _time(seconds: float | None) -> datetime | None:
 
 def job_of(row: RowMapping | dict[str, Any]) -> Job:
     """Return the job that a row with ``has_artifact`` describes."""
-    return Job(
-        id=row["id"],
-        kind=row["kind"],
-        status=JobStatus(row["status"]),
-        lane=row["lane"],
-        payload=row["payload"],
-        result=row["result"],
-        error=row["error"],
-        progress=progress_of(row),
-        attempt=row["attempt"],
-        created_at=datetime.fromtimestamp(row["created_at"], UTC),
-        started_at=_time(row["started_at"]),
-        finished_at=_time(row["finished_at"]),
-        has_artifact=bool(row["has_artifact"]),
-    )
+    return Job(**_summary(row), payload=row["payload"], result=row["result"])
+
+
+def claim_of(row: RowMapping | dict[str, Any], ahead: float) -> Claim:
+    """Return the claim to the job of a row; the service's clock is ``ahead`` of the one of its deadline."""
+    deadline = row["deadline"]
+    return Claim(job_of({"has_artifact": False, **row}), None if deadline is None else deadline + ahead)
+
+
+def summary_of(row: RowMapping | dict[str, Any]) -> JobSummary:
+    """Return what a row of :data:`select_summaries` or :data:`select_small` describes."""
+    return JobSummary(**_summary(row))
+
+
+def _summary(row: RowMapping | dict[str, Any]) -> dict[str, Any]:
+    return {
+        "id": row["id"],
+        "kind": row["kind"],
+        "status": JobStatus(row["status"]),
+        "lane": row["lane"],
+        "error": row["error"],
+        "progress": progress_of(row),
+        "attempt": row["attempt"],
+        "created_at": datetime.fromtimestamp(row["created_at"], UTC),
+        "started_at": _time(row["started_at"]),
+        "finished_at": _time(row["finished_at"]),
+        "has_artifact": bool(row["has_artifact"]),
+        "request_id": row["request_id"],
+        "key_id": row["key_id"],
+    }

@@ -37,7 +37,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     payload
         ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, ``library_url``, the database
         with the source policies, ``threads``, how many cores to keep busy, and ``bound_time_limit_s``, how
-        long to look for a bound, where one is asked for; ``run_time_limit_s`` where time counts from here.
+        long to look for a bound, where one is asked for; ``run_time_limit_s`` where time counts from here;
+        ``keep_checkpoint``, whether to keep what is learned.
     context
         Where progress goes. When it says stop, the best plan so far is the result.
 
@@ -45,7 +46,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     -------
     WorkResult
         The answer of ``POST /allocate`` but for ``job_id`` and ``elapsed_s``; the artifact is the checkpoint
-        of what was learned.
+        of what was learned, where that is to be kept.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def _result(
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
     }
-    return WorkResult(result, solution.checkpoint)
+    return WorkResult(result, solution.checkpoint if payload.get("keep_checkpoint") else None)
 
 
 def train(payload: dict[str, Any], context: WorkContext) -> WorkResult:
@@ -136,7 +137,7 @@ def train(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     AllocatorError
         As in :func:`allocate`.
     """
-    return allocate(payload, context)
+    return allocate({**payload, "keep_checkpoint": True}, context)
 
 
 def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # noqa: ARG001 - nothing to report

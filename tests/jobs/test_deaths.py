@@ -12,7 +12,6 @@ from harness import GATED, KINDS, PATIENCE_S, eventually, finished, make_service
 
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobStatus
-from app.jobs.owner import is_alive, new_owner
 from app.jobs.service import JobService
 from policy_store.database import Database
 
@@ -192,28 +191,3 @@ def test_the_web_side_imports_neither_torch_nor_numba_and_the_worker_no_database
             [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
         )
         assert answer.stdout.strip() == "[]"
-
-
-def test_an_owner_is_alive_as_long_as_its_process():
-    me = new_owner()
-    assert is_alive(me, me)
-    program = "from app.jobs.owner import new_owner; print(new_owner(), flush=True); input()"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    assert process.stdin is not None
-    other = process.stdout.readline().strip()
-    assert is_alive(other, me)
-    # The same process number given out again, another host, and an earlier service of this process.
-    host, pid, _start, token = other.rsplit(":", 3)
-    assert not is_alive(f"{host}:{pid}:1:{token}", me)
-    assert not is_alive(f"elsewhere:{pid}:1:{token}", me)
-    assert not is_alive(new_owner(), me)
-    process.kill()
-    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # dead, but not yet reaped
-    assert not is_alive(other, me)
-    process.stdin.close()
-    process.stdout.close()
-    process.wait()
-    assert not is_alive(other, me)

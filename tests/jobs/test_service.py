@@ -166,27 +166,45 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
     asyncio.run(scenario())
 
 
-def test_retry_after_follows_durations_depth_and_workers():
+def test_retry_after_is_the_time_until_one_place_is_free():
     lanes = Lanes(3)
-    assert lanes.time_to_work_off("interactive", 0, []) == 1.0
+    assert lanes.time_to_a_place("interactive", []) == 1.0
     lanes.ran("interactive", [4.0, 8.0])
     lanes.ran("training", [100.0])
-    assert lanes.time_to_work_off("interactive", 10, []) == 6.0 * 10 / 3
-    assert lanes.time_to_work_off("training", 4, []) == 100.0 * 4 / 2
-    # Of three that run the first has 2 s left of its 6, and the next has to wait for it.
-    fresh = [(4.0, None), (1.0, None), (1.0, None)]
-    assert lanes.time_to_work_off("interactive", 3, fresh) == 2.0 + 6.0 * 3 / 3
-    assert lanes.time_to_work_off("interactive", 3, fresh[:2]) == 6.0 * 3 / 3
+    # A worker is free, or will be when it is warm: one of three takes a job every 2 s, of two every 50 s.
+    assert lanes.time_to_a_place("interactive", []) == 6.0 / 3
+    assert lanes.time_to_a_place("training", []) == 100.0 / 2
+    # Of three that run the first has 2 s left of its 6, however many wait.
+    busy = [("interactive", 4.0, None), ("interactive", 1.0, None), ("interactive", 1.0, None)]
+    assert lanes.time_to_a_place("interactive", busy) == 2.0
+    # Those of other lanes hold workers too, and a lane waits for its own where it may have no more workers.
+    assert lanes.time_to_a_place("interactive", [("training", 99.0, None), *busy[1:]]) == 1.0
+    trainings = [("training", 30.0, None), ("training", 60.0, None)]
+    assert lanes.time_to_a_place("training", [*trainings, ("interactive", 5.0, None)]) == 40.0
 
 
 def test_retry_after_believes_what_runs_longer_than_what_ran():
     lanes = Lanes(1)
     lanes.ran("interactive", [0.1, 0.1])
-    endless = [(60.0, None)]
-    # It goes on for as long again, and those behind it take as long as the mean of all three: 40.07 s.
-    assert lanes.time_to_work_off("interactive", 2, endless) == pytest.approx(60.0 + 2 * (0.2 + 120.0) / 3)
-    # A time limit is kept.
-    assert lanes.time_to_work_off("interactive", 0, [(60.0, 5.0)]) == 5.0
+    # It goes on for as long again, unless its time limit ends it.
+    assert lanes.time_to_a_place("interactive", [("interactive", 60.0, None)]) == 60.0
+    assert lanes.time_to_a_place("interactive", [("interactive", 60.0, 5.0)]) == 5.0
+
+
+def test_those_who_are_refused_together_do_not_all_come_back_together(tmp_path):
+    async def scenario():
+        async with running(tmp_path, max_queued=0) as service:
+            await service.submit("until_file", {"path": str(tmp_path / "gate")})
+            told = set()
+            for _ in range(20):
+                with pytest.raises(QueueFull) as refusal:
+                    await service.submit("echo", {})
+                told.add(refusal.value.retry_after_s)
+            assert len(told) > 10
+            assert min(told) >= 1.0
+            assert max(told) < 10.0
+
+    asyncio.run(scenario())
 
 
 def test_trainings_leave_a_worker_to_what_somebody_waits_for(tmp_path):

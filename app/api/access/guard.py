@@ -10,10 +10,13 @@ import asyncio
 import time
 from collections.abc import Mapping
 from contextvars import ContextVar
+from functools import partial
 from typing import Any
 
+from fastapi import FastAPI
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
+from structlog.contextvars import bind_contextvars
 
 from app.api.access.keys import ApiKey, KeyStore, Role, recognise
 from app.api.problem_details import problem_response, responses
@@ -33,6 +36,9 @@ SCHEME: dict[str, Any] = {
 
 client: ContextVar[str] = ContextVar("client", default="public")
 """Id of the key that the present request came with; ``public`` where none is needed."""
+
+KEY_IS_VALID = "key_is_valid"
+"""In the state of a request that came with a key: asks whether that was revoked, for answers that go on."""
 
 _REALM = 'Bearer realm="uav-allocator"'
 _REMEMBERED_S = 1.0
@@ -125,9 +131,15 @@ class Guard:
             )
         else:
             client.set(key.id)
+            bind_contextvars(key_id=key.id)
+            scope.setdefault("state", {})[KEY_IS_VALID] = partial(self._is_valid, scope["app"], token.strip())
             await self._app(scope, receive, send)
             return
         await refusal(scope, receive, send)
+
+    async def _is_valid(self, app: FastAPI, token: str) -> bool:
+        """Say whether a token that was let through would still be."""
+        return recognise(token, await self._newest(app.state.services.keys)) is not None
 
     async def _newest(self, store: KeyStore) -> Mapping[str, ApiKey]:
         """Return the keys as they were at most a second ago: another process makes and revokes them."""

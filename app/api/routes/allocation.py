@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.allocation_payload import allocation_payload
-from app.api.job_answers import accepted, answer_of, idempotency
+from app.api.job_answers import accepted, answer_of, gone, idempotency
 from app.api.job_kinds import ALLOCATE
 from app.api.job_models import JobModel
 from app.api.json_body import JsonRoute
@@ -21,6 +21,9 @@ from app.api.routes.parameters import LOCATION, IdempotencyKey, Prefer
 from app.api.services import Served
 
 router = APIRouter(route_class=JsonRoute, tags=["allocation"])
+
+CLIENT_HAS_GONE = 499
+"""Of an answer that nobody gets: what the log and the metrics say of it, as those of other servers do."""
 
 
 @router.post(
@@ -63,6 +66,8 @@ async def allocate(
 
     The call waits for the plan and answers 200. With `Prefer: respond-async` it answers 202 at once, with
     `Prefer: wait=N` after N seconds at most; `Location` is then the job to poll, to listen to, or to cancel.
+    If the client closes the connection before, the job is cancelled, unless an `Idempotency-Key` lets it come
+    again or somebody else follows the job.
     """
     payload = allocation_payload(body, services)
     job, _ = await services.jobs.submit(
@@ -70,13 +75,18 @@ async def allocate(
         # Not part of what makes a request the same: an operator may change it between two tries.
         payload | {"threads": services.settings.threads_per_job},
         time_limit_s=_left(body.time_limit_s, request),
-        idempotency=idempotency(idempotency_key, ALLOCATE, payload, body.time_limit_s),
+        idempotency=idempotency(idempotency_key, ALLOCATE, body),
     )
     preferences = Preferences.of(request.headers.getlist("prefer"))
     patience_s = preferences.patience_s
     if patience_s == 0:
         return accepted(job, preferences)
-    job = await services.jobs.wait(job.id, patience_s)
+    if idempotency_key is not None:
+        job = await services.jobs.wait(job.id, patience_s)
+    elif (ended := await services.jobs.wait_for_client(job.id, patience_s, gone(request))) is None:
+        return Response(status_code=CLIENT_HAS_GONE)
+    else:
+        job = ended
     if patience_s is not None and not job.status.finished:
         return accepted(job, preferences)
     answer = answer_of(job)

@@ -63,8 +63,9 @@ async def allocate_batch(
     shape is wrong is refused as a whole.
 
     Each allocation is a job that waits behind those of `POST /allocate`; its `time_limit_s` counts from when
-    its work begins. The jobs go on if the client goes; sent again with the same `Idempotency-Key`, a request
-    gets the answers of the first time, and what was not taken in yet is.
+    its work begins. With an `Idempotency-Key` the jobs go on if the client goes; sent again with the same
+    key, the request gets the answers of the first time, and what was not taken in yet is. Without one they
+    are cancelled when the client goes, but for those that somebody else follows.
     """
     limit = services.settings.batch_limit
     if len(body.problems) > limit:
@@ -82,7 +83,7 @@ def _submission(item: BatchItem, services: Services, key: str | None, index: int
     if item.time_limit_s is not None:
         payload["run_time_limit_s"] = item.time_limit_s
     own_key = None if key is None else f"batch {hashlib.sha256(key.encode()).hexdigest()} {index}"
-    promise = idempotency(own_key, BATCH, payload)
+    promise = idempotency(own_key, BATCH, item)
     return Submission(payload | {"threads": services.settings.threads_per_job}, promise)
 
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import aclosing
 from typing import Annotated
 
-import anyio
-from fastapi import APIRouter, Header, Path, Query
+from fastapi import APIRouter, Header, Path, Query, Request
 from sse_starlette import EventSourceResponse, ServerSentEvent
-from starlette.responses import JSONResponse
+from starlette.responses import Response
 
-from app.api.job_models import JobList, JobModel, job_list, job_model
+from app.api.access.guard import KEY_IS_VALID
+from app.api.job_models import JobList, JobModel, job_list, job_response
 from app.api.library_models import JOB_ID_PATTERN
 from app.api.problem_details import responses
 from app.api.routes.parameters import Cursor
 from app.api.services import Served
+from app.api.stored_json import write
+from app.jobs.model import JobStatus
 from app.jobs.service import JobService
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -48,9 +49,10 @@ async def list_jobs(
     services: Served,
     limit: Annotated[int, Query(ge=1, le=100, description="Jobs a page")] = 20,
     cursor: Cursor = None,
+    status: Annotated[JobStatus | None, Query(description="Only jobs of this status")] = None,
 ) -> JobList:
-    """List the jobs, newest first, without their results. New jobs do not shift the pages that follow."""
-    return job_list(await services.jobs.list(limit, cursor))
+    """List the jobs, newest first, without plans and results. New jobs do not shift the pages that follow."""
+    return job_list(await services.jobs.list(limit, cursor, status))
 
 
 @router.get(
@@ -59,9 +61,10 @@ async def list_jobs(
     response_model=JobModel,
     responses=responses("job-not-found", "invalid-request"),
 )
-async def get_job(job_id: JobId, services: Served) -> JobModel:
+async def get_job(job_id: JobId, services: Served) -> Response:
     """Return a job: its progress and the best plan so far, at its end the result or the error."""
-    return job_model(await services.jobs.get(job_id))
+    job = await services.jobs.look(job_id)
+    return job_response(job, await services.jobs.result_text(job_id) if job.status.finished else None)
 
 
 @router.get(
@@ -74,25 +77,28 @@ async def get_job(job_id: JobId, services: Served) -> JobModel:
             "`end`, which has its `status` too",
             "content": {"text/event-stream": {"schema": _EVENT}},
         },
+        204: {"description": "The job has ended, and `Last-Event-ID` is its last event: there are no more"},
         **responses("job-not-found", "invalid-request"),
     },
 )
 async def get_job_events(
     job_id: JobId,
+    request: Request,
     services: Served,
     last_event_id: Annotated[
         str | None, Header(description="Id of the last event that was seen: only later ones are sent")
     ] = None,
-) -> EventSourceResponse:
+) -> Response:
     """Stream a job's progress until it ends; a client that was cut off goes on after its last event."""
-    await services.jobs.get(job_id)  # an unknown job is answered before the stream begins
+    job = await services.jobs.look(job_id)  # an unknown job is answered before the stream begins
     given = last_event_id or ""
     known = given.isascii() and given.isdigit() and len(given) <= _MAX_EVENT_ID_DIGITS
-    stopping = anyio.Event()
+    after = int(given) if known else 0
+    if services.jobs.has_told_all(job, after):
+        return Response(status_code=204)
+    allowed = getattr(request.state, KEY_IS_VALID, None)
     return EventSourceResponse(
-        _events(services.jobs, job_id, int(given) if known else 0, stopping),
-        shutdown_event=stopping,
-        shutdown_grace_period=_FAREWELL_S,
+        _events(services.jobs, job_id, after, allowed), shutdown_grace_period=_FAREWELL_S
     )
 
 
@@ -106,28 +112,17 @@ async def get_job_events(
         **responses("job-not-found", "invalid-request", "draining"),
     },
 )
-async def cancel_job(job_id: JobId, services: Served) -> JSONResponse:
+async def cancel_job(job_id: JobId, services: Served) -> Response:
     """Cancel a job. One that is running stops soon, and the best plan so far becomes its result."""
     job = await services.jobs.cancel(job_id)
-    return JSONResponse(job_model(job).model_dump(mode="json"), 200 if job.status.finished else 202)
+    result = None if job.result is None else write(job.result)
+    return job_response(job, result, 200 if job.status.finished else 202)
 
 
 async def _events(
-    jobs: JobService, job_id: str, after: int, stopping: anyio.Event
+    jobs: JobService, job_id: str, after: int, allowed: Callable[[], Awaitable[bool]] | None
 ) -> AsyncIterator[ServerSentEvent]:
-    """Yield a job's events, until it ends or the server stops: then the response is still completed."""
-    stopped = asyncio.ensure_future(stopping.wait())
-    events = jobs.events(job_id, after)
-    try:
-        while True:
-            newest = asyncio.ensure_future(anext(events, None))
-            await asyncio.wait((newest, stopped), return_when=asyncio.FIRST_COMPLETED)
-            if not newest.done():
-                newest.cancel()
-                return
-            event = newest.result()
-            if event is None:
-                return
-            yield ServerSentEvent(json.dumps(event.data), event=event.name, id=str(event.id))
-    finally:
-        stopped.cancel()
+    """Yield a job's events until it ends, the server stops, or the client may not have them any more."""
+    async with aclosing(jobs.events(job_id, after, allowed)) as events:
+        async for event in events:
+            yield ServerSentEvent(event.text, event=event.name, id=str(event.id))

@@ -84,7 +84,7 @@ async def register_policy(
     if isinstance(body, RegisterTraining):
         payload = training_payload(body, services)
         job, _ = await services.jobs.submit(
-            TRAIN, payload, idempotency=idempotency(idempotency_key, TRAIN, payload)
+            TRAIN, payload, idempotency=idempotency(idempotency_key, TRAIN, body)
         )
         return accepted(job)
     if isinstance(body, RegisterJob):
@@ -92,7 +92,7 @@ async def register_policy(
     else:
         payload, blamed = checkpoint_payload(body, services), "/checkpoint"
     job, _ = await services.jobs.submit(
-        REGISTER, payload, idempotency=idempotency(idempotency_key, REGISTER, payload)
+        REGISTER, payload, idempotency=idempotency(idempotency_key, REGISTER, body)
     )
     answer = answer_of(await services.jobs.wait(job.id, None), blamed)
     policy = await run_in_threadpool(services.library.get, answer["policy_id"])
