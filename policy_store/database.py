@@ -28,8 +28,8 @@ from policy_store.engines import Engines
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
 
 _NEWER = (
-    "{}: the database was made by a newer version of this program; start that version, or go back to a backup "
-    "from before it"
+    "{}: the database was made by a newer version of this program; start that version, or go back to an "
+    "earlier backup"
 )
 
 

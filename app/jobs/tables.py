@@ -23,8 +23,6 @@ jobs = sa.Table(
     sa.Column("kind", sa.String(64), nullable=False),
     sa.Column("lane", sa.String(16), nullable=False),
     sa.Column("status", sa.String(16), nullable=False),
-    sa.Column("payload", sa.JSON, nullable=False),
-    sa.Column("result", sa.JSON(none_as_null=True)),
     sa.Column("error", sa.JSON(none_as_null=True)),
     sa.Column("progress", sa.JSON, nullable=False),
     sa.Column("attempt", sa.Integer, nullable=False),
@@ -39,8 +37,11 @@ jobs = sa.Table(
     # The id of the request that it came with, and of the API key of that request.
     sa.Column("request_id", sa.String(128)),
     sa.Column("key_id", sa.String(64)),
-    # The best plan so far, apart from the rest of the progress because it may be large.
+    # What may be large comes last, so that the rest of a row is read without it: the best plan so far, what
+    # the work gets and what it returned.
     sa.Column("assignment", sa.JSON(none_as_null=True)),
+    sa.Column("payload", sa.JSON, nullable=False),
+    sa.Column("result", sa.JSON(none_as_null=True)),
     sa.Index("ix_jobs_finished_at", "finished_at"),
     sa.Index("ix_jobs_status_number", "status", "number"),
     sa.Index("ix_jobs_status_lane_number", "status", "lane", "number"),

@@ -4,9 +4,7 @@ import json
 import socket
 import sys
 
-import uvicorn
-
-from app.api.application import create_application
+from app.api.server import Server
 from app.settings import Settings
 
 
@@ -18,8 +16,7 @@ def main() -> None:
     listening.bind(("127.0.0.1", 0))
     listening.listen()
     print(listening.getsockname()[1], flush=True)
-    config = uvicorn.Config(create_application(settings), log_level="warning")
-    uvicorn.Server(config).run(sockets=[listening])
+    Server(settings).run(sockets=[listening])
 
 
 if __name__ == "__main__":

@@ -120,6 +120,18 @@ def test_a_batch_goes_on_without_its_client_and_comes_again_with_its_key(client,
     assert again[1:] == lines[1:]
 
 
+def test_a_batch_whose_client_cannot_come_again_ends_with_it(client, item):
+    endless = {**item, "algorithm": "qmix", "parameters": {"n_epochs": 10_000_000}}
+    quick = {**item, "algorithm": "greedy", "parameters": {}}
+    problems = [quick, *({**endless, "seed": seed} for seed in range(40, 46))]
+    with client.stream("POST", "/allocate/batch", json={"problems": problems}) as response:
+        assert "allocation" in json.loads(next(response.iter_lines()))
+
+    states = ("queued", "running")
+    while any(client.get("/jobs", params={"status": status}).json()["jobs"] for status in states):
+        time.sleep(0.05)
+
+
 def test_a_stopped_server_says_what_it_leaves_and_the_next_goes_on(start_service, item):
     service = start_service(workers=1).await_ready()
     slow = {**item, "algorithm": "local_search", "parameters": {}, "time_limit_s": 0.5}

@@ -1,6 +1,7 @@
 """Jobs over HTTP: asynchronous answers, polling, event streams, cancelling, retries, a full queue."""
 
 import json
+import socket
 import threading
 
 import pytest
@@ -134,7 +135,11 @@ def test_events_go_on_where_they_were_cut_off(client, problem):
     assert all(identifier > last_seen for identifier, _, _ in rest)
     assert [event[1:] for event in rest] == [event[1:] for event in all_of_them[-len(rest) :]]
     with client.stream("GET", f"/jobs/{job_id}/events", headers={"Last-Event-ID": str(ids[-1])}) as stream:
-        assert list(events(stream.iter_lines())) == []
+        # An answer that ends the reconnecting of a browser.
+        assert stream.status_code == 204
+    for ahead in (ids[-1] + 600_000, 10**17):
+        with client.stream("GET", f"/jobs/{job_id}/events", headers={"Last-Event-ID": str(ahead)}) as stream:
+            assert list(events(stream.iter_lines()))[-1][1] == "end"
 
 
 def test_pages_list_every_job_once_newest_first(client, problem):
@@ -158,12 +163,73 @@ def test_pages_list_every_job_once_newest_first(client, problem):
     assert all("result" not in job for job in listed)
 
 
+def test_a_list_has_the_jobs_of_one_status_without_their_plans(client, problem):
+    running = submit(client, problem)
+    until_running(client, running)
+    done = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()["job_id"]
+
+    lists = {
+        status: client.get("/jobs", params={"status": status, "limit": 100}).json()["jobs"]
+        for status in ("running", "succeeded", "queued")
+    }
+    refused = client.get("/jobs", params={"status": "asleep"})
+    client.delete(f"/jobs/{running}")
+
+    assert [job["id"] for job in lists["running"]] == [running]
+    assert done in [job["id"] for job in lists["succeeded"]]
+    assert {job["status"] for job in lists["succeeded"]} == {"succeeded"}
+    assert lists["queued"] == []
+    for job in (*lists["running"], *lists["succeeded"]):
+        assert set(job["progress"]) == {"fraction", "epoch", "best_reward"}
+    assert (refused.status_code, refused.json()["errors"][0]["parameter"]) == (422, "status")
+
+
+def begun_and_left(service, problem, **headers):
+    """Ask for a long allocation, begin to leave once it runs, and return its id."""
+    before = {job["id"] for job in service.client.get("/jobs", params={"limit": 100}).json()["jobs"]}
+    body = json.dumps({**problem, **LONG}).encode()
+    given = {"Content-Type": "application/json", "Content-Length": len(body), **headers}
+    head = "".join(f"{name}: {value}\r\n" for name, value in given.items())
+    url = service.client.base_url
+    connection = socket.create_connection((url.host, url.port))
+    connection.sendall(f"POST /allocate HTTP/1.1\r\nHost: x\r\n{head}\r\n".encode() + body)
+    while True:
+        found = service.client.get("/jobs", params={"limit": 1}).json()["jobs"][0]
+        if found["id"] not in before and found["status"] == "running":
+            return found["id"], connection
+
+
+def test_a_job_whose_client_has_gone_is_ended_if_nobody_else_can_want_it(service, problem, follow):
+    client = service.client
+    left, connection = begun_and_left(service, problem)
+    connection.close()
+    followed, connection = begun_and_left(service, problem)
+    assert client.get(f"/jobs/{followed}").json()["status"] == "running"
+    connection.close()
+
+    # It ends by itself, without anybody who follows it.
+    ended = None
+    while ended is None:
+        listed = client.get("/jobs", params={"status": "cancelled", "limit": 100}).json()["jobs"]
+        ended = next((job for job in listed if job["id"] == left), None)
+    # The place it had is another's, who comes again with a key; the followed one still has its own.
+    keyed, connection = begun_and_left(service, problem, **{"Idempotency-Key": "left-1"})
+    connection.close()
+    for _ in range(3):
+        client.post("/allocate", json={**problem, "algorithm": "greedy", "time_limit_s": 0.2})
+    states = {job_id: client.get(f"/jobs/{job_id}").json()["status"] for job_id in (followed, keyed)}
+    for job_id in states:
+        client.delete(f"/jobs/{job_id}")
+        follow(job_id)
+    assert set(states.values()) == {"running"}
+
+
 def test_retry_with_the_same_key_is_the_same_job(client, problem):
     body = {**problem, "algorithm": "greedy"}
     key = {"Idempotency-Key": "retry-1"}
     first = client.post("/allocate", json=body, headers=key)
 
-    again = client.post("/allocate", json={**body, "seed": 123, "max_steps": 5}, headers=key)
+    again = client.post("/allocate", json=dict(reversed(body.items())), headers=key)
     later = client.post("/allocate", json=body, headers={**key, **ASYNC})
     other = client.post("/allocate", json={**body, "seed": 1}, headers=key)
 

@@ -34,6 +34,7 @@ def moved(task, by):
 def learned(client, task=TASK, seed=123, **parameters):
     """The id of a job that has learned a task."""
     body = {**task, "algorithm": "qmix", "parameters": {**QUICK, **parameters}, "seed": seed}
+    body["keep_checkpoint"] = True
     answer = client.post("/allocate", json=body)
     assert answer.status_code == 200, answer.text
     return answer.json()["job_id"]
@@ -253,6 +254,16 @@ def test_job_that_learned_nothing_is_not_registered(client):
 
     assert (response.status_code, response.json()["type"]) == (409, "job-without-checkpoint")
     assert (unknown.status_code, unknown.json()["type"]) == (404, "job-not-found")
+
+
+def test_what_an_allocation_learns_is_kept_only_where_that_is_asked_for(client):
+    body = {**TASK, "algorithm": "qmix", "parameters": QUICK}
+    job_id = client.post("/allocate", json=body).json()["job_id"]
+
+    refused = client.post("/library", json={"name": "x", "job_id": job_id})
+
+    assert (refused.status_code, refused.json()["type"]) == (409, "job-without-checkpoint")
+    assert '"keep_checkpoint": true' in refused.json()["detail"]
 
 
 def damaged(data, change):

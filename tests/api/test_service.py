@@ -3,10 +3,14 @@
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
+import httpx
 import pytest
 
 from app.api.openapi_examples import ALLOCATION_EXAMPLES, REGISTRATION_EXAMPLES, SIMILAR_EXAMPLES
@@ -100,6 +104,50 @@ def test_it_takes_jobs_before_it_is_ready_and_a_clean_stop_ends_open_streams(sta
         for _ in lines:
             pass
     assert service.process.wait(20) in ENDED
+
+
+def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(start_service, problem):
+    service = start_service(workers=1, shutdown_grace_s=6.0).await_ready()
+    url = service.client.base_url
+    answers = {}
+
+    def ask(name, body):
+        with httpx.Client(base_url=url, timeout=60) as client:
+            answers[name] = client.post("/allocate", json=body)
+
+    def ask_for_many():
+        body = {"problems": [{**problem, **LONG}]}
+        with (
+            httpx.Client(base_url=url, timeout=60) as client,
+            client.stream("POST", "/allocate/batch", json=body) as stream,
+        ):
+            answers["batch"] = [json.loads(line) for line in stream.iter_lines()]
+
+    callers = [threading.Thread(target=ask, args=(name, {**problem, **LONG})) for name in ("runs", "waits")]
+    callers.append(threading.Thread(target=ask_for_many))
+    for caller in callers:
+        caller.start()
+    while len(service.client.get("/jobs").json()["jobs"]) < 3:
+        time.sleep(0.01)
+    unfinished = socket.create_connection((url.host, url.port))
+    unfinished.sendall(b"POST /allocate HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n{")
+    service.client.get("/healthz")  # what was sent before has arrived
+
+    service.process.send_signal(signal.SIGTERM)
+    refused = b""
+    while chunk := unfinished.recv(65536):
+        refused += chunk
+    unfinished.close()
+    for caller in callers:
+        caller.join(60)
+    assert service.process.wait(60) in ENDED
+
+    for name in ("runs", "waits"):
+        assert (answers[name].status_code, answers[name].json()["type"]) == (503, "draining")
+        assert int(answers[name].headers["retry-after"]) > 0
+    assert [line["problem"]["type"] for line in answers["batch"]] == ["draining"]
+    assert refused.startswith(b"HTTP/1.1 503 ")
+    assert b'"type":"draining"' in refused
 
 
 def test_description_is_complete(client):

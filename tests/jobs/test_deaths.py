@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import sqlalchemy as sa
@@ -167,6 +168,23 @@ def test_a_worker_whose_warm_up_fails_is_not_ready_and_tried_again(tmp_path):
         assert executor.ready == 1
         await executor.close()
         assert executor.ready == 0
+
+    asyncio.run(scenario())
+
+
+def test_workers_that_warm_up_hold_no_thread_that_requests_need(tmp_path):
+    async def scenario():
+        gate = tmp_path / "gate"
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        executor = LocalExecutor(3, warm_up="job_work:until_gate", environment={"GATE": str(gate)})
+        await executor.start(lambda: None)
+        await eventually(lambda: all(each.pid is not None for each in executor._workers))
+        # All three are warming up, and the only thread is free.
+        assert await asyncio.wait_for(asyncio.to_thread(lambda: 1), PATIENCE_S) == 1
+        assert executor.ready == 0
+        gate.touch()
+        await eventually(lambda: executor.ready == 3)
+        await executor.close()
 
     asyncio.run(scenario())
 

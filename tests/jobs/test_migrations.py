@@ -22,10 +22,15 @@ def test_a_database_of_the_first_version_is_brought_forward(any_database_url):
         connection.execute(
             sa.text(
                 "INSERT INTO jobs (id, kind, lane, status, payload, result, progress, attempt, losses, "
-                "owner, cancel_requested, created_at, started_at, finished_at) "
-                """VALUES ('x', 'solve', 'interactive', 'succeeded', '{"a": 1}', '{"ok": 1}', :progress, 1, 0, 'me', :false, 1.5, 2.5, 3.5)"""
+                "owner, cancel_requested, created_at, started_at, finished_at) VALUES ('x', 'solve', "
+                "'interactive', 'succeeded', :payload, :result, :progress, 1, 0, 'me', :false, 1.5, 2.5, 3.5)"
             ),
-            {"false": False, "progress": json.dumps(Progress(1.0, assignment=[[0, 1]]).as_json())},
+            {
+                "false": False,
+                "payload": '{"a": 1}',
+                "result": '{"ok": 1}',
+                "progress": json.dumps(Progress(1.0, assignment=[[0, 1]]).as_json()),
+            },
         )
         connection.execute(
             sa.text("INSERT INTO job_artifacts VALUES ('x', :weights)"), {"weights": b"weights"}

@@ -1,13 +1,16 @@
 """A job's way through the service: taken in, worked on, stored, told."""
 
 import asyncio
+import json
+import os
 from datetime import UTC, datetime
 from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from harness import PATIENCE_S, finished, make_service, reports, running, url_of
+from harness import KINDS, PATIENCE_S, finished, make_service, reports, running, url_of
 from sqlalchemy.exc import OperationalError
+from structlog.contextvars import bound_contextvars
 
 from app.domain.errors import InvalidCheckpoint
 from app.jobs import housekeeping, writer
@@ -15,6 +18,7 @@ from app.jobs.errors import Draining, IdempotencyMismatch, JobNotFound, QueueFul
 from app.jobs.lanes import Lanes
 from app.jobs.model import Idempotency, JobKind, JobStatus
 from policy_store.database import Database
+from policy_store.errors import DatabaseOccupied
 
 
 def test_a_job_goes_round(tmp_path):
@@ -224,6 +228,79 @@ def test_trainings_leave_a_worker_to_what_somebody_waits_for(tmp_path):
     asyncio.run(scenario())
 
 
+def test_batches_leave_a_worker_to_what_somebody_waits_for(tmp_path):
+    batch = (*KINDS, JobKind("batch", "job_work:until_file", "batch"))
+
+    async def scenario():
+        gate = tmp_path / "gate"
+        async with running(tmp_path, slots=2, kinds=batch) as service:
+            jobs = [(await service.submit("batch", {"path": str(gate)}))[0] for _ in range(3)]
+            for _ in range(3):
+                short = await finished(service, (await service.submit("echo", {}))[0])
+                assert short.status is JobStatus.SUCCEEDED
+            states = [(await service.get(job.id)).status.value for job in jobs]
+            assert states == ["running", "queued", "queued"]
+            gate.touch()
+            for job in jobs:
+                assert (await finished(service, job)).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
+def test_a_list_reads_neither_payloads_nor_results(tmp_path):
+    def read(text):
+        assert "large" not in text
+        return json.loads(text)
+
+    async def scenario():
+        async with running(tmp_path) as service:
+            ended = [
+                await finished(service, (await service.submit("echo", {"large": n}))[0]) for n in range(3)
+            ]
+            service._store.database.read_engine.dialect._json_deserializer = read
+            page = await service.list(10, None, JobStatus.SUCCEEDED)
+            assert [job.id for job in page.jobs] == [job.id for job in reversed(ended)]
+            assert (await service.list(10, None, JobStatus.FAILED)).jobs == ()
+            assert (await service.look(ended[0].id)).id == ended[0].id
+            with pytest.raises(AssertionError):
+                await service.get(ended[0].id)
+            assert json.loads(await service.result_text(ended[0].id))["echo"] == {"large": 0}
+
+    asyncio.run(scenario())
+
+
+def test_a_job_knows_the_request_and_the_key_that_asked_for_it(tmp_path):
+    async def scenario():
+        async with running(tmp_path) as service:
+            with bound_contextvars(request_id="r-1", key_id="k-1"):
+                job, _ = await service.submit("echo", {})
+            nobodys, _ = await service.submit("echo", {})
+        async with running(tmp_path) as service:
+            asked = [await finished(service, each) for each in (job, nobodys)]
+        assert [(each.request_id, each.key_id) for each in asked] == [("r-1", "k-1"), (None, None)]
+        assert asked[0].labels == {"request_id": "r-1", "key_id": "k-1", "job_id": job.id}
+
+    asyncio.run(scenario())
+
+
+def test_a_second_service_on_the_file_is_refused_and_changes_nothing(tmp_path):
+    async def scenario():
+        gate = {"path": str(tmp_path / "gate")}
+        async with running(tmp_path) as first:
+            job, _ = await first.submit("until_file", gate)
+            await reports(first, job)
+            database = Database(url_of(tmp_path))
+            with pytest.raises(DatabaseOccupied, match=str(os.getpid())):
+                await make_service(database).start()
+            database.dispose()
+            (tmp_path / "gate").touch()
+            assert (await finished(first, job)).attempt == 1
+        async with running(tmp_path) as after:
+            assert (await after.get(job.id)).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
 def test_on_a_single_worker_what_somebody_waits_for_comes_first(tmp_path):
     async def scenario():
         gate = tmp_path / "gate"
@@ -276,6 +353,9 @@ def test_stopping_lets_running_work_end_and_takes_no_more(tmp_path):
         listener = asyncio.create_task(anext(stream, None))
         stopping = asyncio.create_task(service.stop(PATIENCE_S))
         assert await listener is None  # the stream ends although the job does not
+        # Who waits for what does not run is told at once, and nothing is given up for their sake.
+        assert (await asyncio.wait_for(patient, PATIENCE_S)).status is JobStatus.QUEUED
+        await service.abandon(job.id)
         with pytest.raises(Draining):
             await service.submit("echo", {})
         gate.touch()

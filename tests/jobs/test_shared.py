@@ -1,8 +1,10 @@
 """Several services on one PostgreSQL database: jobs are done by all, and none is done twice or lost."""
 
 import asyncio
+import json
 import subprocess
 import sys
+import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
@@ -14,11 +16,13 @@ import sqlalchemy as sa
 from harness import GATED, KINDS, LEASE_S, PATIENCE_S, eventually, finished, make_service, reports, running
 from postgresql_server import PostgresqlServer
 from sqlalchemy.exc import OperationalError
+from structlog.contextvars import bound_contextvars
 
+from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull
 from app.jobs.lease import Lease
 from app.jobs.local import LocalExecutor
-from app.jobs.model import Idempotency, JobKind, JobStatus
+from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore, QueueLimit
 from policy_store.database import Database
 
@@ -311,6 +315,75 @@ def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(url):
             assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
 
     asyncio.run(scenario())
+
+
+def test_a_service_that_takes_its_own_job_again_loses_no_worker(url, tmp_path):
+    async def scenario():
+        async with running(url, slots=2, lease_s=LEASE_S) as one:
+            database = Database(url)
+            judge = JobStore(database, "judge", 3)
+            job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
+            await reports(one, job)
+            [lost] = await asyncio.to_thread(judge.recover, ["until_file"], lambda owner: False)
+            assert (lost.id, lost.status) == (job.id, JobStatus.QUEUED)
+            # The other worker of the same service takes it, while the first still works on it.
+            one._dispatcher._waiting.heard("interactive")
+            await eventually(lambda: one._dispatcher._runs.of(job.id).job.attempt == 2)
+            assert (await one.cancel(job.id)).status is JobStatus.RUNNING
+            (tmp_path / "gate").touch()
+            ended = await finished(one, job)
+            assert (ended.status, ended.attempt) == (JobStatus.CANCELLED, 2)
+            await eventually(lambda: not one._dispatcher._runs)
+            assert sum(one.load().running.values()) == 0
+            await eventually(lambda: one.load().ready == 2)
+            both = [(await one.submit("echo", {}))[0] for _ in range(2)]
+            assert {(await finished(one, each)).status for each in both} == {JobStatus.SUCCEEDED}
+            database.dispose()
+
+    asyncio.run(scenario())
+
+
+def test_the_id_of_a_request_reaches_the_worker_of_another_service(url, capfd):
+    async def scenario():
+        loud = LocalExecutor(1, log_level="info")
+        async with running(url, executor=loud, max_queued=1000) as other:
+            database = Database(url)
+            cold = LocalExecutor(1, warm_up="job_work:never")
+            one = make_service(database, executor=cold, max_queued=1000)
+            await one.start()
+            with bound_contextvars(request_id="r-1", key_id="k-1"):
+                job, _ = await one.submit("speak", {"said": ""})
+            assert (await finished(one, job)).attempt == 1
+            assert (await other.get(job.id)).key_id == "k-1"
+            await one.stop(0.0)
+            database.dispose()
+        return job.id
+
+    job_id = asyncio.run(scenario())
+    lines = [json.loads(line) for line in capfd.readouterr().err.splitlines() if line.startswith("{")]
+    [said] = [line for line in lines if line["event"] == "said"]
+    assert (said["request_id"], said["key_id"], said["job_id"]) == ("r-1", "k-1", job_id)
+
+
+def test_times_are_those_of_the_database_whatever_a_machine_thinks(url):
+    hours = 3600.0
+    database = Database(url)
+    astray = JobStore(database, "astray", 3, clock=Clock(lambda: time.time() + 10 * hours))
+    right = JobStore(database, "right", 3)
+    astray.migrate()
+    before = time.time() - 60.0
+    taken_in, _ = astray.insert(KINDS[0], {}, run_now=False, limit=QueueLimit(9, 1.0), time_limit_s=hours)
+    assert before < taken_in.job.created_at.timestamp() < time.time() + 60.0
+    for store in (astray, right):
+        [(_, _, deadline)] = store.deadlines()
+        assert hours - 60.0 < deadline - store.clock.now() <= hours
+    claim = astray.claim("interactive")
+    assert hours - 60.0 < claim.deadline - astray.clock.now() <= hours
+    done = right.succeed(claim.job.id, 1, WorkResult({}), Progress(), None)
+    assert before < done.created_at.timestamp() <= done.started_at.timestamp()
+    assert done.started_at <= done.finished_at
+    assert done.finished_at.timestamp() < time.time() + 60.0
+    database.dispose()
 
 
 def test_a_service_that_was_taken_for_dead_gives_up_its_work(url, tmp_path):

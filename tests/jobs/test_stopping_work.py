@@ -62,6 +62,29 @@ def test_work_that_ignores_its_cancellation_is_killed_and_its_progress_stays(tmp
     asyncio.run(scenario())
 
 
+def test_work_that_takes_longer_than_its_kind_may_ends_with_the_best_it_has(tmp_path):
+    kinds = (
+        JobKind("until_stopped", "job_work:until_stopped", "interactive", max_run_s=0.3),
+        # Answered when its own time is up, but that is not.
+        JobKind("deaf", "job_work:deaf", "interactive", at_once="job_work:echo", max_run_s=0.3),
+    )
+
+    async def scenario():
+        async with running(tmp_path, kinds=kinds, overrun_grace_s=0.3) as service:
+            for limit_s in (None, 3600.0):
+                job, _ = await service.submit("until_stopped", {}, time_limit_s=limit_s)
+                done = await finished(service, job)
+                assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
+                # The search does not know of it: it does what it does without a limit.
+                assert (done.result["time_left"] is None) == (limit_s is None)
+            stubborn, _ = await service.submit("deaf", {}, time_limit_s=3600.0)
+            done = await finished(service, stubborn)
+            assert (done.status, done.attempt) == (JobStatus.FAILED, 1)
+            assert done.error["code"] == "time-limit-exceeded"
+
+    asyncio.run(scenario())
+
+
 def test_work_stops_by_itself_when_its_time_is_up(tmp_path):
     async def scenario():
         async with running(tmp_path) as service:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextvars import ContextVar
 from functools import partial
 from typing import Any
@@ -37,8 +37,8 @@ SCHEME: dict[str, Any] = {
 client: ContextVar[str] = ContextVar("client", default="public")
 """Id of the key that the present request came with; ``public`` where none is needed."""
 
-KEY_IS_VALID = "key_is_valid"
-"""In the state of a request that came with a key: asks whether that was revoked, for answers that go on."""
+key_is_valid: ContextVar[Callable[[], Awaitable[bool]] | None] = ContextVar("key_is_valid", default=None)
+"""For answers that go on: asks whether the key of the present request is still valid; None without one."""
 
 _REALM = 'Bearer realm="uav-allocator"'
 _REMEMBERED_S = 1.0
@@ -132,7 +132,7 @@ class Guard:
         else:
             client.set(key.id)
             bind_contextvars(key_id=key.id)
-            scope.setdefault("state", {})[KEY_IS_VALID] = partial(self._is_valid, scope["app"], token.strip())
+            key_is_valid.set(partial(self._is_valid, scope["app"], token.strip()))
             await self._app(scope, receive, send)
             return
         await refusal(scope, receive, send)

@@ -6,11 +6,11 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Path, Query, Request
+from fastapi import APIRouter, Header, Path, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.responses import Response
 
-from app.api.access.guard import KEY_IS_VALID
+from app.api.access.guard import key_is_valid
 from app.api.job_models import JobList, JobModel, job_list, job_response
 from app.api.library_models import JOB_ID_PATTERN
 from app.api.problem_details import responses
@@ -83,7 +83,6 @@ async def get_job(job_id: JobId, services: Served) -> Response:
 )
 async def get_job_events(
     job_id: JobId,
-    request: Request,
     services: Served,
     last_event_id: Annotated[
         str | None, Header(description="Id of the last event that was seen: only later ones are sent")
@@ -96,9 +95,8 @@ async def get_job_events(
     after = int(given) if known else 0
     if services.jobs.has_told_all(job, after):
         return Response(status_code=204)
-    allowed = getattr(request.state, KEY_IS_VALID, None)
     return EventSourceResponse(
-        _events(services.jobs, job_id, after, allowed), shutdown_grace_period=_FAREWELL_S
+        _events(services.jobs, job_id, after, key_is_valid.get()), shutdown_grace_period=_FAREWELL_S
     )
 
 

@@ -1,6 +1,7 @@
-"""Who asked for a job and in which request, its plan apart from its progress, and an index of the states.
+"""Who asked for a job and in which request, its plan apart from its progress, and what is large last.
 
-Plans of earlier jobs stay in their progress: to move them would write all payloads and results anew.
+SQLite reads a row up to the last column that is asked for, so a list of jobs read all payloads and results.
+Plans of earlier jobs stay in their progress.
 
 Revision ID: 0004
 """
@@ -15,12 +16,20 @@ down_revision = "0003"
 branch_labels = None
 depends_on = None
 
+_SMALL = (
+    "number, id, kind, lane, status, error, progress, attempt, losses, owner, cancel_requested, deadline, "
+    "created_at, started_at, finished_at"
+)
+
 
 def upgrade() -> None:
-    """Add the columns and the index."""
-    op.add_column("jobs", sa.Column("request_id", sa.String(128)))
-    op.add_column("jobs", sa.Column("key_id", sa.String(64)))
-    op.add_column("jobs", sa.Column("assignment", sa.JSON))
+    """Add the columns, in SQLite to a new table, and an index of the states."""
+    if op.get_bind().dialect.name == "sqlite":
+        _build_anew()
+    else:
+        op.add_column("jobs", sa.Column("request_id", sa.String(128)))
+        op.add_column("jobs", sa.Column("key_id", sa.String(64)))
+        op.add_column("jobs", sa.Column("assignment", sa.JSON))
     op.create_index("ix_jobs_status_number", "jobs", ["status", "number"])
 
 
@@ -29,3 +38,38 @@ def downgrade() -> None:
     op.drop_index("ix_jobs_status_number", "jobs")
     for name in ("assignment", "key_id", "request_id"):
         op.drop_column("jobs", name)
+
+
+def _build_anew() -> None:
+    op.create_table(
+        "jobs_anew",
+        sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
+        sa.Column("id", sa.String(32), nullable=False, unique=True),
+        sa.Column("kind", sa.String(64), nullable=False),
+        sa.Column("lane", sa.String(16), nullable=False),
+        sa.Column("status", sa.String(16), nullable=False),
+        sa.Column("error", sa.JSON),
+        sa.Column("progress", sa.JSON, nullable=False),
+        sa.Column("attempt", sa.Integer, nullable=False),
+        sa.Column("losses", sa.Integer, nullable=False),
+        sa.Column("owner", sa.String(255)),
+        sa.Column("cancel_requested", sa.Boolean, nullable=False),
+        sa.Column("deadline", sa.Double),
+        sa.Column("created_at", sa.Double, nullable=False),
+        sa.Column("started_at", sa.Double),
+        sa.Column("finished_at", sa.Double),
+        sa.Column("request_id", sa.String(128)),
+        sa.Column("key_id", sa.String(64)),
+        sa.Column("assignment", sa.JSON),
+        sa.Column("payload", sa.JSON, nullable=False),
+        sa.Column("result", sa.JSON),
+        sqlite_autoincrement=True,
+    )
+    op.execute(
+        f"INSERT INTO jobs_anew ({_SMALL}, payload, result) SELECT {_SMALL}, payload, result "
+        "FROM jobs ORDER BY number"
+    )
+    op.drop_table("jobs")
+    op.rename_table("jobs_anew", "jobs")
+    op.create_index("ix_jobs_status_lane_number", "jobs", ["status", "lane", "number"])
+    op.create_index("ix_jobs_finished_at", "jobs", ["finished_at"])
