@@ -26,7 +26,9 @@ START_S = 120.0
 
 @pytest.fixture
 def invoke(tmp_path):
-    return lambda *arguments: CliRunner().invoke(application, [*arguments, "--data-dir", str(tmp_path)])
+    return lambda *arguments: CliRunner().invoke(
+        application, arguments if "--data-dir" in arguments else [*arguments, "--data-dir", str(tmp_path)]
+    )
 
 
 @pytest.fixture
@@ -52,6 +54,29 @@ def test_experiments_that_are_not_done_go_on_with_the_same_command(tmp_path):
     refused = CliRunner().invoke(application, [*words, "--cells", "9x9"])
     assert refused.exit_code == 1
     assert "'9x9' is no size of the grid" in refused.stderr
+
+
+def test_a_service_that_cannot_start_says_why_in_a_sentence(invoke, tmp_path):
+    occupied = Database(f"sqlite:///{tmp_path / 'allocator.sqlite3'}")
+    occupied.occupy()
+    refused = invoke("serve")
+    occupied.vacate()
+    assert (refused.exit_code, refused.stdout) == (1, "")
+    assert refused.stderr.startswith("the service cannot start: another service (process ")
+
+    with occupied.write() as connection:
+        connection.exec_driver_sql("CREATE TABLE alembic_version_jobs (version_num TEXT)")
+        connection.exec_driver_sql("INSERT INTO alembic_version_jobs VALUES ('9999')")
+    occupied.dispose()
+    refused = invoke("serve")
+    assert refused.exit_code == 1
+    assert "newer version of this program" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+
+    (tmp_path / "file").touch()
+    refused = invoke("serve", "--data-dir", str(tmp_path / "file" / "folder"))
+    assert refused.exit_code == 1
+    assert "cannot be written" in refused.stderr
 
 
 def test_a_key_is_made_shown_once_listed_and_revoked(invoke, known):

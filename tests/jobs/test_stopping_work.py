@@ -5,7 +5,7 @@ import time
 
 from harness import PATIENCE_S, eventually, finished, reports, running
 
-from app.jobs.model import JobEvent, JobStatus
+from app.jobs.model import JobEvent, JobKind, JobStatus
 
 
 def test_a_cancelled_job_keeps_the_best_it_found(tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from policy_store import backup
 from policy_store.backup import back_up
 from policy_store.database import Database
 from policy_store.errors import BackupFailed
@@ -93,6 +94,19 @@ def test_a_damaged_database_is_not_passed_on_as_a_backup(database, tmp_path):
     with pytest.raises(BackupFailed):
         back_up(source, tmp_path / "copy")
     assert not (tmp_path / "copy").exists()
+
+
+def test_a_full_disk_leaves_nothing_behind(database, tmp_path, monkeypatch):
+    def copy(source, target):
+        # As SQLite does, whose journal stays where there was no room to finish.
+        target.with_name(target.name + "-journal").write_bytes(b"half")
+        raise sqlite3.OperationalError("database or disk is full")
+
+    before = set(tmp_path.iterdir())
+    monkeypatch.setattr(backup, "_copy", copy)
+    with pytest.raises(BackupFailed, match="full"):
+        back_up(file_of(database), tmp_path / "copy")
+    assert set(tmp_path.iterdir()) == before
 
 
 def test_a_folder_that_is_missing_is_named(database, tmp_path):

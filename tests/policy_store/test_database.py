@@ -15,11 +15,18 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DatabaseError, OperationalError
 
 from app.api import stored_json
+from policy_store import sqlite
 from policy_store.database import Database
-from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
+from policy_store.errors import (
+    DatabaseOccupied,
+    DatabaseUnusable,
+    MigrationFailed,
+    NestedWrite,
+    UnsupportedDatabase,
+)
 from policy_store.library import PolicyLibrary
 from policy_store.tables import metadata
 
@@ -317,8 +324,86 @@ def test_a_database_of_a_newer_program_is_refused(database: Database, tmp_path: 
     newer = write_migrations(tmp_path / "newer", "pass", "pass")
     older = write_migrations(tmp_path / "older", "pass")
     database.migrate(newer, "version_other")
-    with pytest.raises(MigrationFailed, match="'2'"):
+    with pytest.raises(MigrationFailed, match=r"'2'.*newer version of this program"):
         database.migrate(older, "version_other")
+
+
+def test_one_service_at_a_time_occupies_a_file_and_a_kill_frees_it(database: Database) -> None:
+    program = """
+        import sys
+        from policy_store.database import Database
+
+        Database(sys.argv[1]).occupy()
+        print("occupied", flush=True)
+        sys.stdin.read()
+    """
+    process = start(program, database.url)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "occupied\n"
+    with pytest.raises(DatabaseOccupied, match=rf"process {process.pid} on .*PostgreSQL"):
+        database.occupy()
+    # What is no service may work on it all the same.
+    assert scalar(database, "SELECT 1") == 1
+    process.kill()
+    process.communicate()
+    database.occupy()
+    other = Database(database.url)
+    with pytest.raises(DatabaseOccupied):
+        other.occupy()
+    database.vacate()
+    other.occupy()
+    other.vacate()
+    other.dispose()
+
+
+def test_a_file_and_a_folder_that_are_made_are_their_owners_alone(tmp_path: Path) -> None:
+    old = tmp_path / "old.db"
+    old.touch()
+    old.chmod(0o640)
+    before = os.umask(0)
+    try:
+        for path in (tmp_path / "new" / "a.db", old):
+            database = Database(f"sqlite:///{path}")
+            with database.write() as connection:
+                connection.execute(text("CREATE TABLE a (x INTEGER)"))
+            database.dispose()
+    finally:
+        os.umask(before)
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
+    assert (tmp_path / "new" / "a.db").stat().st_mode & 0o777 == 0o600
+    assert old.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize("where", ["/proc/nowhere/a.db", "/dev/null/a.db"])
+def test_a_folder_that_cannot_be_made_is_said_at_once(where: str) -> None:
+    with pytest.raises(DatabaseUnusable, match=where):
+        Database(f"sqlite:///{where}")
+
+
+def test_a_folder_that_cannot_be_written_is_said_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # of root, no folder is
+    with pytest.raises(DatabaseUnusable, match="read-only"):
+        Database(f"sqlite:///{tmp_path / 'a.db'}")
+
+
+def test_only_who_is_kept_waiting_tries_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a file that is no database, and one on a medium that is read-only, nothing becomes by waiting."""
+    (tmp_path / "a.db").write_bytes(b"no database, but long enough to have a header " * 30)
+    slept = []
+    monkeypatch.setattr(sqlite.time, "sleep", slept.append)
+    database = Database(f"sqlite:///{tmp_path / 'a.db'}")
+    with pytest.raises(DatabaseError), database.write():
+        pass
+    read_only = sqlite3.connect(f"file:{tmp_path / 'b.db'}?mode=rwc", uri=True)
+    read_only.execute("CREATE TABLE a (x INTEGER)")
+    read_only.close()
+    read_only = sqlite3.connect(f"file:{tmp_path / 'b.db'}?mode=ro", uri=True)
+    with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        sqlite._use_wal(read_only, 60.0)
+    read_only.close()
+    assert slept == []
 
 
 PARENT_AND_CHILD = """
