@@ -9,7 +9,11 @@ timer's. What is no HTTP at all is answered like every other error.
 from __future__ import annotations
 
 import asyncio
+import fcntl
+import termios
 import uuid
+from array import array
+from contextlib import suppress
 from http import HTTPStatus
 from typing import Any
 
@@ -54,13 +58,16 @@ class _DeadlineProtocol(H11Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._disarm()
-        if self._reading is not None:
-            self._reading.cancel()
+        self._let_reader()
         super().connection_lost(exc)
 
     def pause_writing(self) -> None:
         super().pause_writing()
         self._watch_reader()
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._let_reader()
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
@@ -68,13 +75,26 @@ class _DeadlineProtocol(H11Protocol):
 
     def _watch_reader(self) -> None:
         """Begin to see that what waits to be sent becomes less, until there is none."""
-        unsent = self.transport.get_write_buffer_size()
-        if unsent and self._reading is None:
-            self._reading = self.loop.call_later(self.receive_timeout_s, self._look_at_reader, unsent)
+        if self.transport.get_write_buffer_size() and self._reading is None:
+            self._reading = self.loop.call_later(
+                self.receive_timeout_s, self._look_at_reader, self._untaken()
+            )
+
+    def _let_reader(self) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
+
+    def _untaken(self) -> int:
+        """Return how many bytes of answers the client has not taken, those in the system's queue included."""
+        queued = array("i", [0])
+        with suppress(OSError):  # not every system says
+            fcntl.ioctl(self.transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, queued)
+        return self.transport.get_write_buffer_size() + queued[0]
 
     def _look_at_reader(self, before: int) -> None:
         self._reading = None
-        if self.transport.get_write_buffer_size() < before:
+        if self._untaken() < before:
             self._watch_reader()
             return
         with bound_contextvars(request_id=self._refused_id):

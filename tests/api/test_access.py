@@ -8,6 +8,7 @@ import re
 import httpx
 import pytest
 
+from app.api.access import guard
 from app.api.access.guard import needed_role
 from app.api.access.keys import KeyStore, Role, metadata, recognise
 from app.api.application import create_application
@@ -15,9 +16,11 @@ from app.api.batch import Batches
 from app.api.job_kinds import BATCH
 from app.api.metrics import Metrics
 from app.api.services import Services
+from app.jobs import listening
 from app.jobs.local import LocalExecutor
+from app.jobs.model import JobKind
 from app.jobs.service import JobService
-from app.jobs.store import JobStore
+from app.jobs.store import JobStore, QueueLimit
 from app.settings import Settings
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
@@ -195,6 +198,31 @@ def test_the_first_key_closes_a_running_service_and_revoking_it_does_not_open_it
     now[0] += 1.1
     assert client.get("/jobs", headers=bearer(token)).status_code == 401
     assert client.get("/jobs").status_code == 401
+
+
+def test_a_stream_that_goes_on_ends_when_its_key_is_revoked(keys, start, monkeypatch):
+    monkeypatch.setattr(guard, "_REMEMBERED_S", 0.0)
+    monkeypatch.setattr(listening, "_ASK_AGAIN_S", 0.01)
+    key, token = keys.create("dispatch", Role.ALLOCATE)
+    service = start()
+    services = service.app.state.services
+    store = JobStore(services.database, "me", 3)
+    kind = JobKind("solve", "nowhere:solve", "interactive")
+    waits, _ = store.insert(kind, {}, run_now=False, limit=QueueLimit(1, 1.0))
+    path = f"/jobs/{waits.job.id}/events"
+
+    async def scenario():
+        transport = httpx.ASGITransport(service.app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
+            listening_to = asyncio.create_task(client.get(path, headers=bearer(token)))
+            while not services.jobs._listening._listeners:
+                await asyncio.sleep(0.001)
+            assert await asyncio.to_thread(keys.revoke, key.id)
+            return await asyncio.wait_for(listening_to, 60)
+
+    answer = asyncio.run(scenario())
+    assert (answer.status_code, answer.content) == (200, b"")
+    assert service.get(path, headers=bearer(token)).status_code == 401
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.7", "dispatch.example"])

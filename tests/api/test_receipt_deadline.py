@@ -16,6 +16,7 @@ from app.logs import labels
 
 SHORT_S, LONG_S = 0.4, 60.0
 PATIENCE_S = 20.0
+LARGE = 16 * 1024**2
 HEAD = b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n"
 GET = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 
@@ -31,6 +32,16 @@ async def application(scope, receive, send):
             return
         body += message["body"]
         more = message["more_body"]
+    if scope["path"] in ("/endless", "/large"):
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        if scope["path"] == "/large":
+            await send({"type": "http.response.body", "body": b"x" * LARGE})
+            return
+        sending = asyncio.create_task(send_without_end(send))
+        while (await receive())["type"] != "http.disconnect":
+            continue
+        sending.cancel()
+        return
     await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"10")]})
     if scope["path"] == "/slow":
         await send({"type": "http.response.body", "body": b"12345", "more_body": True})
@@ -40,8 +51,13 @@ async def application(scope, receive, send):
         await send({"type": "http.response.body", "body": b"%10d" % len(body)})
 
 
+async def send_without_end(send):
+    while True:
+        await send({"type": "http.response.body", "body": b"x" * 100_000, "more_body": True})
+
+
 @contextmanager
-def served(deadline_s, **settings):
+def serving(deadline_s, **settings):
     listening = socket.create_server(("127.0.0.1", 0), backlog=256)
     settings = {"log_level": "warning", "timeout_graceful_shutdown": 1, **settings}
     config = uvicorn.Config(application, http=protocol_with_deadline(deadline_s), **settings)
@@ -49,10 +65,18 @@ def served(deadline_s, **settings):
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
     try:
-        yield listening.getsockname()
+        while not server.started:
+            time.sleep(0.01)
+        yield server
     finally:
         server.should_exit = True
         thread.join(PATIENCE_S)
+
+
+@contextmanager
+def served(deadline_s, **settings):
+    with serving(deadline_s, **settings) as server:
+        yield server.servers[0].sockets[0].getsockname()
 
 
 @contextmanager
@@ -185,6 +209,44 @@ def test_a_long_answer_is_not_touched(address):
         received, after_s = until_closed(connection)
     assert received.endswith(b"1234567890")
     assert after_s > 2 * SHORT_S  # of the three that the server waits, by a clock of its own
+
+
+@pytest.mark.parametrize("path", ["endless", "large"])
+def test_who_takes_nothing_of_an_answer_is_closed(path):
+    with serving(SHORT_S) as server, asking_for(path, server) as connection:
+        eventually(lambda: server.server_state.connections)
+        # Bytes have a place on their way to the client, and then no more are taken.
+        eventually(lambda: not server.server_state.connections)
+        # What was on its way arrives, and no more.
+        assert len(until_closed(connection)[0]) < LARGE
+
+
+def test_who_takes_an_answer_bit_by_bit_gets_all_of_it():
+    with serving(SHORT_S) as server, asking_for("large", server) as connection:
+        received, begun = 0, time.monotonic()
+        while chunk := connection.recv(65536):
+            received += len(chunk)
+            if time.monotonic() - begun < 5 * SHORT_S:
+                time.sleep(SHORT_S / 20)
+    assert received > LARGE
+
+
+@contextmanager
+def asking_for(path, server):
+    """Ask for an answer, of which little has a place in the client's system."""
+    with socket.socket() as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.settimeout(PATIENCE_S)
+        connection.connect(server.servers[0].sockets[0].getsockname())
+        connection.sendall(f"GET /{path} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n".encode())
+        yield connection
+
+
+def eventually(condition):
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def test_slow_senders_do_not_delay_others():

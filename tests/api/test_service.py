@@ -61,7 +61,8 @@ def test_web_process_loads_neither_torch_nor_compiled_code():
 
 def test_restart_keeps_jobs_and_library_and_goes_on_with_what_ran(start_service, problem):
     before = start_service(workers=1, max_checkpoint_bytes=10**6).await_ready()
-    quick = {**problem, "algorithm": "qmix", "parameters": {"n_epochs": 4, "buffer_size": 2, "batch_size": 2}}
+    parameters = {"n_epochs": 4, "buffer_size": 2, "batch_size": 2}
+    quick = {**problem, "algorithm": "qmix", "parameters": parameters, "keep_checkpoint": True}
     answer = before.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json()
     policy = before.client.post("/library", json={"name": "kept", "job_id": answer["job_id"]}).json()
     job = before.client.get(f"/jobs/{answer['job_id']}").json()

@@ -56,7 +56,7 @@ async def allocate_batch(
     services: Served,
     idempotency_key: IdempotencyKey = None,
 ) -> Response:
-    """Find plans for many problems, on all workers there are.
+    """Find plans for many problems, on all workers but one, which is left to single requests.
 
     The answer is streamed: a line for each problem as soon as it is solved, with its `index` in the request,
     its `id` if it has one, and either the `allocation` or the `problem` that it failed with. A request whose
