@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import re
 from collections.abc import AsyncIterator
@@ -29,6 +30,7 @@ from app.api.request_log import RequestLog
 from app.api.routes import algorithms, allocation, batch, examples, jobs, library, operations, plans
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
+from app.api.threads import started_threads
 from app.jobs.executor import Executor
 from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED, LocalExecutor
 from app.jobs.ray_cluster import RayExecutor
@@ -50,6 +52,7 @@ _READ_HEADERS = (
 )
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
 _WARM_UP, _WARM_UP_RESERVE = "app.jobs.warm_up:warm_up", "app.jobs.warm_up:warm_up_at_once"
+_REQUEST_THREADS = 8
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
 
@@ -66,6 +69,7 @@ def create_application(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(application: FastAPI) -> AsyncIterator[None]:
+        asyncio.get_running_loop().set_default_executor(started_threads(_REQUEST_THREADS))
         limits = ContainerLimits(bytes=settings.max_checkpoint_bytes)
         database = Database(settings.resolved_database_url, stored_json.write, stored_json.read)
         try:
