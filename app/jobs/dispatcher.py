@@ -86,8 +86,7 @@ class Dispatcher:
         self._writer = Writer()
         self._settling = Settling(store, self._writer, self._kinds, overrun_grace_s)
         self._lanes = Lanes(executor.capacity)
-        self._runs = Runs()
-        self._clock = store.clock
+        self._runs, self._clock = Runs(), store.clock
         self._wake = asyncio.Event()
         self._company = company_on(store.database, owner, lease_s, self._writer, self._runs, channels)
         self._last_minute = LastMinute(self._answer_at_once, self._clock.now)
@@ -197,8 +196,8 @@ class Dispatcher:
             self._clock.follow()
         run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
         places = self._max_queued[lane]
-        free_in_s = self._lanes.time_to_a_place(lane, self._runs.times(self._clock.now()))
-        limit = QueueLimit(places, free_in_s * random.uniform(1.0, _LATEST_RETURN))
+        free_s = self._lanes.time_to_a_place(lane, self._runs.times(self._clock.now()))
+        limit = QueueLimit(places, free_s * random.uniform(1.0, _LATEST_RETURN))
         asked_by = labels()
         if run_now:
             self._lanes.running[lane] += 1
@@ -241,8 +240,7 @@ class Dispatcher:
         if before is JobStatus.QUEUED:
             self._waiting.less(job)
             self._tell_end(job, None)
-        run = self._runs.of(job_id)
-        if before is JobStatus.RUNNING and run is not None:
+        elif before is JobStatus.RUNNING and (run := self._runs.of(job_id)) is not None:
             run.stop(self._grace_s)
         elif before is JobStatus.RUNNING:
             self._company.tell_cancelled(job_id)
@@ -317,7 +315,7 @@ class Dispatcher:
             executor, work = self._reserve, kind.at_once
         channel = self._channels.open(job.id)
         now = self._clock.now()
-        run = Run(job, claim.deadline, channel, job.progress, now, saved_at=time.monotonic(), at_once=at_once)
+        run = Run(job, claim.deadline, channel, job.progress, now, time.monotonic(), at_once=at_once)
         self._runs.add(run)
 
         def on_progress(progress: Progress) -> None:
@@ -328,6 +326,7 @@ class Dispatcher:
         if job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
         left = None if claim.deadline is None else claim.deadline - now
+        loop = asyncio.get_running_loop()
         run.execution = executor.submit(
             work,
             job.payload,
@@ -335,7 +334,6 @@ class Dispatcher:
             on_progress=on_progress,
             labels=job.labels,
         )
-        loop = asyncio.get_running_loop()
         if left is not None:
             run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
         if kind.max_run_s is not None:
