@@ -48,6 +48,8 @@ def _name_limits(components: dict[str, Any], settings: Settings) -> None:
         components[name]["properties"]["targets"]["maxItems"] = settings.max_targets
     for name in ("UAVModel", "TargetModel"):
         components[name]["properties"]["loadlist"]["maxItems"] = settings.max_materials
+    requested, _null = components["TargetModel"]["properties"]["requested"]["anyOf"]
+    requested["maxItems"] = settings.max_materials
 
 
 def operation_id(route: APIRoute) -> str:

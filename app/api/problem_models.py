@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from app.domain.errors import InvalidProblem, ProblemTooLarge, Violation
+from app.domain.identifiers import ID_PATTERN, MAX_ID_LENGTH
 from app.domain.problem import (
-    MAX_ID_LENGTH,
     MAX_MAGNITUDE,
     MAX_STEPS,
-    MIN_SPEED,
+    MIN_MAGNITUDE,
     UAV,
     Objective,
     Problem,
@@ -28,7 +28,11 @@ Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
 Amount = Annotated[float, Field(ge=0, le=MAX_MAGNITUDE)]
 Whole = Annotated[int, BeforeValidator(_without_point)]
 """An integer as JSON Schema has it: 1.0 is one too, which is what some languages write."""
-Identifier = Annotated[str, Field(min_length=1, max_length=MAX_ID_LENGTH)]
+Identifier = Annotated[
+    str,
+    # The domain checks the pattern, and names the character that breaks it.
+    Field(min_length=1, max_length=MAX_ID_LENGTH, json_schema_extra={"pattern": ID_PATTERN}),
+]
 
 
 class WireModel(BaseModel):
@@ -48,7 +52,9 @@ class UAVModel(WireModel):
     x_c: Coordinate | None = Field(default=None, description="Current position; default: the starting point")
     y_c: Coordinate | None = Field(default=None, description="Current position; default: the starting point")
     speed: float = Field(
-        ge=MIN_SPEED, le=MAX_MAGNITUDE, description="Average speed: distance units per time unit, or km/h"
+        ge=MIN_MAGNITUDE,
+        le=MAX_MAGNITUDE,
+        description="Average speed: distance units per time unit, or km/h",
     )
     voyage: Amount = Field(description="Maximum range of one flight, in distance units, or km")
     dis: Amount = Field(default=0.0, description="Distance already flown")
@@ -70,6 +76,13 @@ class TargetModel(WireModel):
         default=None, description="Latest arrival, in time units from now; default: none"
     )
     service_time: Amount = Field(default=0.0, description="Time spent unloading at a visit")
+    requested: list[Amount] | None = Field(
+        default=None,
+        min_length=1,
+        description="Amounts that it asked for at first, one a material, none below its `loadlist`; what a "
+        "visit earns is by shares of these, so an area that has nearly all is not as urgent as one that has "
+        "nothing. Default: its `loadlist`",
+    )
 
 
 class ObjectiveModel(WireModel):
@@ -176,4 +189,6 @@ def _target(body: TargetModel, number: int) -> Target:
         loadlist=tuple(body.loadlist),
         deadline=body.deadline,
         service_time=body.service_time,
+        # What is the default is the same problem, written out or not.
+        requested=None if body.requested in (None, body.loadlist) else tuple(body.requested),
     )

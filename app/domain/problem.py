@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypeVar
+
+import numpy as np
 
 from app.domain.errors import InvalidProblem, Violation
-from app.domain.geometry import distance
+from app.domain.geometry import distance, longitude_stretch
+from app.domain.identifiers import fault_of
 
 Crs = Literal["local", "wgs84"]
 Unloading = Literal["greedy", "planned"]
@@ -24,11 +27,23 @@ MAX_STEPS = 100
 MAX_MAGNITUDE = 1e12
 """Largest absolute value of any number of a problem: keeps every sum and product of the simulator finite."""
 
-MIN_SPEED = 1e-9
-"""Smallest speed; below it arrival times would leave the range of floating-point numbers."""
+MIN_MAGNITUDE = 1e-100
+"""Smallest absolute value of a number that is not 0: smaller ones are taken as 0.
 
-MAX_ID_LENGTH = 100
-"""Longest identifier of a UAV or a target, in characters."""
+Products of three such numbers, and quotients of them and ``MAX_MAGNITUDE``, are still ordinary numbers. A
+speed, which must not be 0, is refused below it.
+"""
+
+TOLERANCE = 1e-6
+"""Relative tolerance of the comparisons with range and deadline."""
+
+ROUNDING = 1e-9
+"""Share of an amount: a part of it that is smaller is rounding, and counts as nothing."""
+
+_SAME_PLACE_KM = 1e-9
+"""Extent on the globe below which all positions are one place."""
+
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +100,10 @@ class Target:
         Latest arrival in time units from now, or None.
     service_time
         Time spent unloading at a visit.
+    requested
+        Amounts that it asked for at first, K of them, none below its ``loadlist``; None stands for that. What
+        a visit earns is by shares of these, so an area that is nearly served is not as urgent as one that has
+        nothing.
     """
 
     id: str
@@ -94,6 +113,24 @@ class Target:
     loadlist: tuple[float, ...]
     deadline: float | None = None
     service_time: float = 0.0
+    requested: tuple[float, ...] | None = None
+
+    @property
+    def need(self) -> tuple[float, ...]:
+        """Amounts still needed, without those that are only the rounding of what was requested."""
+        if self.requested is None:
+            return self.loadlist
+        return tuple(
+            needed if needed >= ROUNDING * asked else 0.0
+            for needed, asked in zip(self.loadlist, self.requested, strict=True)
+        )
+
+    @property
+    def urgency(self) -> float:
+        """What meeting the whole need earns: level · needed / requested."""
+        if self.requested is None or not any(self.requested):
+            return self.level
+        return self.level * (sum(self.need) / sum(self.requested))
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +176,10 @@ class Problem:
         violations = list(_violations(self))
         if violations:
             raise InvalidProblem.of(violations)
+        if _has_tiny(self):
+            object.__setattr__(self, "uavs", tuple(_without_tiny(uav) for uav in self.uavs))
+            object.__setattr__(self, "targets", tuple(_without_tiny(target) for target in self.targets))
+            object.__setattr__(self, "objective", _without_tiny(self.objective))
 
     @property
     def n_uavs(self) -> int:
@@ -157,11 +198,17 @@ class Problem:
 
     @cached_property
     def extent(self) -> float:
-        """Diagonal of the bounding box of all positions, in distance units; 1 if it is zero."""
+        """Diagonal of the bounding box of all positions, in distance units; 1 if it is zero.
+
+        On the globe the box is over the shortest stretch of longitudes that holds them all, so it may cross
+        the antimeridian, and less than 1e-9 km is zero.
+        """
         xs = [x for u in self.uavs for x in (u.x_s, u.x_c)] + [t.x for t in self.targets]
         ys = [y for u in self.uavs for y in (u.y_s, u.y_c)] + [t.y for t in self.targets]
-        diagonal = distance(self.crs, min(xs), min(ys), max(xs), max(ys))
-        return diagonal if diagonal > 0 else 1.0
+        on_globe = self.crs == "wgs84"
+        west, east = longitude_stretch(xs) if on_globe else (min(xs), max(xs))
+        diagonal = distance(self.crs, west, min(ys), east, max(ys))
+        return diagonal if diagonal >= (_SAME_PLACE_KM if on_globe else MIN_MAGNITUDE) else 1.0
 
     @property
     def distance_weight(self) -> float:
@@ -203,7 +250,7 @@ def _uav_violations(problem: Problem, materials: int | None) -> Iterator[Violati
             and -y_limit <= uav.y_s <= y_limit
             and -x_limit <= uav.x_c <= x_limit
             and -y_limit <= uav.y_c <= y_limit
-            and MIN_SPEED <= uav.speed <= MAX_MAGNITUDE
+            and MIN_MAGNITUDE <= uav.speed <= MAX_MAGNITUDE
             and 0.0 <= uav.voyage <= MAX_MAGNITUDE
             and 0.0 <= uav.dis <= MAX_MAGNITUDE
             and _are_amounts(uav.loadlist, materials)
@@ -214,7 +261,7 @@ def _uav_violations(problem: Problem, materials: int | None) -> Iterator[Violati
         yield from _identifier(at, uav.id, seen, i)
         yield from _position(at, problem.crs, uav.x_s, uav.y_s, "x_s", "y_s")
         yield from _position(at, problem.crs, uav.x_c, uav.y_c, "x_c", "y_c")
-        yield from _number(f"{at}/speed", uav.speed, low=MIN_SPEED)
+        yield from _number(f"{at}/speed", uav.speed, low=MIN_MAGNITUDE)
         yield from _number(f"{at}/voyage", uav.voyage, low=0.0)
         yield from _number(f"{at}/dis", uav.dis, low=0.0)
         yield from _amounts(f"{at}/loadlist", uav.loadlist, materials)
@@ -231,6 +278,7 @@ def _target_violations(problem: Problem, materials: int | None) -> Iterator[Viol
             and (target.deadline is None or -MAX_MAGNITUDE <= target.deadline <= MAX_MAGNITUDE)
             and 0.0 <= target.service_time <= MAX_MAGNITUDE
             and _are_amounts(target.loadlist, materials)
+            and (target.requested is None or _are_enough(target.requested, target.loadlist))
             and _is_new(target.id, seen, j)
         ):
             continue
@@ -242,6 +290,8 @@ def _target_violations(problem: Problem, materials: int | None) -> Iterator[Viol
             yield from _number(f"{at}/deadline", target.deadline)
         yield from _number(f"{at}/service_time", target.service_time, low=0.0)
         yield from _amounts(f"{at}/loadlist", target.loadlist, materials)
+        if target.requested is not None:
+            yield from _requested(f"{at}/requested", target.requested, target.loadlist, materials)
 
 
 def _number(
@@ -250,7 +300,13 @@ def _number(
     if not math.isfinite(value):
         yield Violation(pointer, f"{value} is not a finite number")
     elif not low <= value <= high:
-        yield Violation(pointer, f"{value:g} is not in {low:g}..{high:g}")
+        yield Violation(pointer, f"{_written(value)} is not in {low:g}..{high:g}")
+
+
+def _written(value: float) -> str:
+    """Write a number briefly, but never as another one: 180.0000001 is not 180."""
+    brief = f"{value:g}"
+    return brief if float(brief) == value else repr(float(value))
 
 
 def _position(at: str, crs: str, x: float, y: float, x_name: str, y_name: str) -> Iterator[Violation]:
@@ -274,9 +330,16 @@ def _are_amounts(amounts: tuple[float, ...], materials: int | None) -> bool:
     )
 
 
+def _are_enough(requested: tuple[float, ...], needed: tuple[float, ...]) -> bool:
+    """Whether :func:`_requested` has nothing to say, where the needs are sound."""
+    return _are_amounts(requested, len(needed)) and not any(
+        ask < need * (1.0 - ROUNDING) for ask, need in zip(requested, needed, strict=True)
+    )
+
+
 def _is_new(identifier: str, seen: dict[str, int], index: int) -> bool:
     """Whether :func:`_identifier` has nothing to say; the id is known from then on."""
-    sound = 1 <= len(identifier) <= MAX_ID_LENGTH and identifier.isprintable() and identifier not in seen
+    sound = identifier not in seen and fault_of(identifier) is None
     if sound:
         seen[identifier] = index
     return sound
@@ -289,12 +352,47 @@ def _amounts(pointer: str, amounts: tuple[float, ...], materials: int | None) ->
         yield from _number(f"{pointer}/{k}", amount, low=0.0)
 
 
+def _requested(
+    pointer: str, requested: tuple[float, ...], needed: tuple[float, ...], materials: int | None
+) -> Iterator[Violation]:
+    yield from _amounts(pointer, requested, materials)
+    for k, (ask, need) in enumerate(zip(requested, needed, strict=False)):
+        if ask < need * (1.0 - ROUNDING):
+            yield Violation(
+                f"{pointer}/{k}", f"{_written(ask)} is less than the {_written(need)} still needed"
+            )
+
+
 def _identifier(at: str, identifier: str, seen: dict[str, int], index: int) -> Iterator[Violation]:
-    if not 1 <= len(identifier) <= MAX_ID_LENGTH:
-        yield Violation(f"{at}/id", f"{len(identifier)} characters, not in 1..{MAX_ID_LENGTH}")
-    elif not identifier.isprintable():
-        yield Violation(f"{at}/id", f"{identifier!a} has characters that cannot be printed")
+    fault = fault_of(identifier)
+    if fault is not None:
+        yield Violation(f"{at}/id", fault)
     elif identifier in seen:
         yield Violation(f"{at}/id", f"{identifier!r} is already the id of number {seen[identifier]}")
     else:
         seen[identifier] = index
+
+
+def _has_tiny(problem: Problem) -> bool:
+    """Whether any number of a sound problem is too small to count; one look at all of them."""
+    of_uavs = [(u.x_s, u.y_s, u.x_c, u.y_c, u.voyage, u.dis, *u.loadlist) for u in problem.uavs]
+    of_targets = [
+        (t.x, t.y, t.level, t.deadline or 0.0, t.service_time, *t.loadlist, *(t.requested or t.loadlist))
+        for t in problem.targets
+    ]
+    numbers = np.concatenate(
+        [np.ravel(of_uavs), np.ravel(of_targets), [problem.objective.distance_weight or 0.0]]
+    )
+    return bool(((np.abs(numbers) < MIN_MAGNITUDE) & (numbers != 0.0)).any())
+
+
+def _without_tiny(item: _Item) -> _Item:
+    """Return a UAV, a target or an objective in which every number that is too small to count is 0."""
+    changes = {each.name: _settled(getattr(item, each.name)) for each in fields(item)}  # type: ignore[arg-type]  # one of three dataclasses
+    return replace(item, **changes)  # type: ignore[type-var]  # as above
+
+
+def _settled(value: object) -> object:
+    if isinstance(value, tuple):
+        return tuple(_settled(each) for each in value)
+    return 0.0 if isinstance(value, float) and abs(value) < MIN_MAGNITUDE else value

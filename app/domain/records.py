@@ -27,7 +27,11 @@ def problem_to_record(problem: Problem) -> dict[str, Any]:
             for uav in problem.uavs
         ],
         "targets": [
-            dict(zip(_TARGET, _target_values(target), strict=True), loadlist=list(target.loadlist))
+            dict(
+                zip(_TARGET, _target_values(target), strict=True),
+                loadlist=list(target.loadlist),
+                requested=None if target.requested is None else list(target.requested),
+            )
             for target in problem.targets
         ],
         "max_steps": problem.max_steps,
@@ -79,8 +83,20 @@ def problem_from_record(record: Mapping[str, Any]) -> Problem:
         uavs=tuple(
             UAV(**{**u, "ret": bool(u["ret"]), "loadlist": tuple(u["loadlist"])}) for u in record["uavs"]
         ),
-        targets=tuple(Target(**{**t, "loadlist": tuple(t["loadlist"])}) for t in record["targets"]),
+        targets=tuple(_target(t) for t in record["targets"]),
         max_steps=record["max_steps"],
         crs=record["crs"],
         objective=Objective(**record["objective"]),
+    )
+
+
+def _target(record: Mapping[str, Any]) -> Target:
+    # Records from before targets had `requested` lack it.
+    requested = record.get("requested")
+    return Target(
+        **{
+            **record,
+            "loadlist": tuple(record["loadlist"]),
+            "requested": None if requested is None else tuple(requested),
+        }
     )

@@ -48,7 +48,7 @@ def features_of(problem: Problem) -> Features:
     description = task_description(problem).astype(np.float32)
     n_own = m * (UAV_FIELDS + k)
     largest_voyage = max(u.voyage for u in problem.uavs)
-    loads = [uav.loadlist for uav in problem.uavs] + [target.loadlist for target in problem.targets]
+    loads = [uav.loadlist for uav in problem.uavs] + [target.need for target in problem.targets]
     return Features(
         uavs=description[:n_own].reshape(m, UAV_FIELDS + k),
         targets=description[n_own:].reshape(n, TARGET_FIELDS + k),

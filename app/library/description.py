@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from app.domain.geometry import unrolled
 from app.domain.problem import Problem
 
 PAPER_SPACE = "task-description-1"
@@ -41,21 +42,23 @@ def task_description(problem: Problem) -> npt.NDArray[np.float64]:
         ret and its load; a target's x, y, level and its need.
     """
     uavs, targets = problem.uavs, problem.targets
-    starts = np.array([(u.x_s, u.y_s) for u in uavs])  # (M, 2)
-    current = np.array([(u.x_c, u.y_c) for u in uavs])
-    areas = np.array([(t.x, t.y) for t in targets])  # (N, 2)
-    corners = np.concatenate([starts, current, areas])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    places = np.array(
+        [(u.x_s, u.y_s) for u in uavs] + [(u.x_c, u.y_c) for u in uavs] + [(t.x, t.y) for t in targets],
+        dtype=np.float64,
+    )
+    places[:, 0] = unrolled(problem.crs, places[:, 0])
+    starts, current, areas = np.split(places, [len(uavs), 2 * len(uavs)])  # (M, 2), (M, 2), (N, 2)
+    low, high = places.min(axis=0), places.max(axis=0)
     diagonal = math.hypot(*(high - low)) or 1.0
 
     loads = np.array([u.loadlist for u in uavs])  # (M, K)
-    needs = np.array([t.loadlist for t in targets])  # (N, K)
+    needs = np.array([t.need for t in targets])  # (N, K)
     largest_amount = max(loads.max(), needs.max()) or 1.0
     voyages = np.array([u.voyage for u in uavs])
     largest_voyage = voyages.max() or 1.0
     flown = np.minimum([u.dis for u in uavs], largest_voyage * _LARGEST_SHARE) / largest_voyage
     speeds = np.array([u.speed for u in uavs])
-    levels = np.array([t.level for t in targets])
+    levels = np.array([t.urgency for t in targets])
 
     uav_rows = np.column_stack(
         [

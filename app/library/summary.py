@@ -14,8 +14,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.geometry import distances
-from app.domain.problem import Problem
+from app.domain.geometry import distances, unrolled
+from app.domain.problem import TOLERANCE, Problem
 
 SUMMARY_SPACE = "task-summary-1"
 """Kind and version of the features; tasks of every size share it."""
@@ -76,7 +76,7 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
     extent = problem.extent
     out = np.array([not u.ret for u in uavs])
     load = np.array([u.loadlist for u in uavs]) * out[:, None]  # (M, K) what can still be delivered
-    need = np.array([t.loadlist for t in targets])  # (N, K)
+    need = np.array([t.need for t in targets])  # (N, K)
     wanted = need.sum(axis=1) > 0
     supply, demand = load.sum(axis=0), need.sum(axis=0)
     covered = np.minimum(supply, demand).sum()
@@ -90,11 +90,12 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
     voyage = np.array([u.voyage for u in uavs])
     flown = np.array([u.dis for u in uavs])
     left = np.maximum(voyage - flown, 0.0)
-    in_range = (to_target + home <= left[:, None]) & out[:, None] & wanted[None, :]
+    reach = flown[:, None] + to_target + home
+    in_range = (reach <= voyage[:, None] * (1.0 + TOLERANCE)) & out[:, None] & wanted[None, :]
 
     speed = np.array([u.speed for u in uavs])
     crossing = extent / speed.mean()
-    level = np.array([t.level for t in targets])
+    level = np.array([t.urgency for t in targets])
     deadlines = np.array([t.deadline for t in targets if t.deadline is not None])
     time_allowed = np.maximum(deadlines, 0.0).mean() if len(deadlines) else np.inf
     service = np.array([t.service_time for t in targets])
@@ -171,7 +172,8 @@ def _nearest_neighbour(apart: npt.NDArray[np.float64]) -> float:
 
 def _elongation(problem: Problem, points: npt.NDArray[np.float64]) -> float:
     """How much longer than wide the cloud of points is: 0 for a round one, 1 for points on a line."""
-    plane = points - points.mean(axis=0)
+    flat = np.column_stack([unrolled(problem.crs, points[:, 0]), points[:, 1]])
+    plane = flat - flat.mean(axis=0)
     if problem.crs == "wgs84":
         plane = plane * [math.cos(math.radians(float(points[:, 1].mean()))), 1.0]
     narrow, wide = np.sqrt(np.maximum(np.linalg.eigvalsh(plane.T @ plane), 0.0))

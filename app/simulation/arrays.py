@@ -44,9 +44,14 @@ class ProblemArrays(NamedTuple):
         (P, M, K) amounts carried.
     need
         (P, N, K) amounts needed.
+    requested
+        (P, N, K) amounts that the needs are a part of; the needs, where the request says nothing else.
     need_total
-        (P, N) sum of the needs over materials.
-    level, deadline, service
+        (P, N) sum of the needs over materials; 0 for a target that needs nothing.
+    level
+        (P, N) what meeting the whole need earns: the emergency level, times the share of what was requested
+        that is still needed.
+    deadline, service
         (P, N); deadline is infinite where there is none.
     weight
         (P,) distance weight λ as it is used.
@@ -66,6 +71,7 @@ class ProblemArrays(NamedTuple):
     ret: Flags
     load: Floats
     need: Floats
+    requested: Floats
     need_total: Floats
     level: Floats
     deadline: Floats
@@ -112,7 +118,7 @@ def _compile(problem: Problem) -> ProblemArrays:
     start = np.array([(u.x_s, u.y_s) for u in uavs], dtype=np.float64)
     current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
     area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
-    need = np.array([t.loadlist for t in targets], dtype=np.float64)
+    need = np.array([t.need for t in targets], dtype=np.float64)
     start_target = between_points(problem.crs, current, area)
     # Most swarms are where they start, and have the same way to a target as home from it.
     home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, area)
@@ -129,8 +135,11 @@ def _compile(problem: Problem) -> ProblemArrays:
         ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
         load=np.array([[u.loadlist for u in uavs]], dtype=np.float64),
         need=need[None],
+        requested=np.array(
+            [[t.loadlist if t.requested is None else t.requested for t in targets]], dtype=np.float64
+        ),
         need_total=need.sum(axis=1)[None],
-        level=np.array([[t.level for t in targets]], dtype=np.float64),
+        level=np.array([[t.urgency for t in targets]], dtype=np.float64),
         deadline=np.array(
             [[np.inf if t.deadline is None else t.deadline for t in targets]], dtype=np.float64
         ),

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.geometry import EARTH_RADIUS_KM
+from app.domain.geometry import EARTH_RADIUS_KM, eastward, parallel
 from app.simulation.compilation import njit
 
 Floats = npt.NDArray[np.float64]
@@ -20,6 +20,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 _compiled: Callable[[Function], Function] = njit(**_OPTIONS)
+_eastward, _parallel = _compiled(eastward), _compiled(parallel)
 
 _TINY = 1e-140
 """Below it the square of a distance loses digits, or is 0."""
@@ -85,10 +86,10 @@ def _great_circles(
                 angle = 2 * math.asin(chord / 2)
             else:
                 latitude_a, latitude_b = math.radians(a[i, 1]), math.radians(b[j, 1])
-                across = math.sin(math.radians(b[j, 0] - a[i, 0]) / 2)
+                across = math.sin(math.radians(_eastward(a[i, 0], b[j, 0])) / 2)
                 h = (
                     math.sin((latitude_b - latitude_a) / 2) ** 2
-                    + math.cos(latitude_a) * math.cos(latitude_b) * across**2
+                    + _parallel(a[i, 1]) * _parallel(b[j, 1]) * across**2
                 )
                 angle = 2 * math.asin(min(1.0, math.sqrt(h)))
             out[i, j] = EARTH_RADIUS_KM * angle

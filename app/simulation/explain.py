@@ -11,6 +11,7 @@ from app.domain.errors import IllegalPlan
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation import simulator
+from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.unloading import best_deliveries
 from app.simulation.unmet import unmet_targets
@@ -71,6 +72,7 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     delivered = np.zeros((*actions.shape, problem.n_materials)) if given is None else given
     return_legs = np.zeros(problem.n_uavs)
     _trace(arrays, episodes, actions, given is not None, legs, arrivals, delivered, return_legs)
+    tidy(arrays, actions, delivered, episodes.need[0])
     routes = []
     for i, uav in enumerate(problem.uavs):
         stops = tuple(

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from app.domain.problem import ROUNDING
+from app.domain.problem import TOLERANCE as TOLERANCE  # noqa: PLC0414 - one of the rules, exported from here
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 
@@ -27,9 +29,6 @@ arrays costs 6 ns instead of 340. Allocate in Python or in an ordinary ``njit`` 
 
 compiled_free: Callable[[Function], Function] = njit(nogil=True, **_OPTIONS)
 """The same, and other threads run meanwhile: for the outermost function of long work."""
-
-TOLERANCE = 1e-6
-"""Relative tolerance of the comparisons with range and deadline."""
 
 ALLOWED = 0
 RETURNING = 1
@@ -213,12 +212,23 @@ def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: 
     reach = episodes.flown[b, i] + d
     if arrays.return_to_base[p]:
         reach += arrays.home[p, i, j]
-    if reach > arrays.voyage[p, i] * (1.0 + TOLERANCE):
+    if reach > farthest(arrays.voyage[p, i]):
         return OUT_OF_RANGE
-    deadline = arrays.deadline[p, j]
-    if episodes.clock[b, i] + d / arrays.speed[p, i] > deadline + abs(deadline) * TOLERANCE:
+    if episodes.clock[b, i] + d / arrays.speed[p, i] > latest(arrays.deadline[p, j]):
         return TOO_LATE
     return ALLOWED
+
+
+@compiled
+def farthest(voyage: float) -> float:
+    """Distance that a range allows, with the tolerance of rule 2."""
+    return voyage * (1.0 + TOLERANCE)
+
+
+@compiled
+def latest(deadline: float) -> float:
+    """Time at which a deadline allows to arrive, with the tolerance of rule 2."""
+    return deadline + abs(deadline) * TOLERANCE
 
 
 @compiled
@@ -266,9 +276,24 @@ def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) ->
 def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k: int, amount: float) -> float:
     """Unload an amount of material `k`, and return what it earns (rules 4 and 5)."""
     p = episodes.problem[b]
-    episodes.load[b, i, k] -= amount
-    episodes.need[b, j, k] -= amount
+    episodes.load[b, i, k] = left_of(episodes.load[b, i, k], amount, arrays.load[p, i, k])
+    episodes.need[b, j, k] = left_of(episodes.need[b, j, k], amount, arrays.requested[p, j, k])
     return arrays.level[p, j] * amount / arrays.need_total[p, j]
+
+
+@compiled
+def left_of(amount: float, taken: float, whole: float) -> float:
+    """What is left of a load or need after some of it was taken; rounding of the whole is nothing.
+
+    Parameters
+    ----------
+    amount, taken
+        What there was, and what is taken from it.
+    whole
+        What the amount is a part of: the first load, or what was requested.
+    """
+    left = amount - taken
+    return left if left >= ROUNDING * whole else 0.0
 
 
 @compiled
@@ -458,11 +483,3 @@ def deliver(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, delivered
     for k in range(delivered.shape[2]):
         if delivered[s, i, k] > 0.0:
             episodes.satisfaction[0] += unload(arrays, episodes, 0, i, j, k, delivered[s, i, k])
-            episodes.load[0, i, k] = _without_rounding(episodes.load[0, i, k], arrays.load[0, i, k])
-            episodes.need[0, j, k] = _without_rounding(episodes.need[0, j, k], arrays.need[0, j, k])
-
-
-@compiled
-def _without_rounding(left: float, whole: float) -> float:
-    """Nothing where what is left of an amount is only the rounding of what was taken from it."""
-    return left if left > 1e-12 * whole else 0.0

@@ -14,14 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.domain.problem import ROUNDING
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 
 NONE = -1
 """End of a linked list, and of a path."""
-
-ROUNDING = 1e-12
-"""Share of a load or need below which what is left of it is rounding: it is not moved."""
 
 
 class Visits(NamedTuple):

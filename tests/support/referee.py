@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 TOLERANCE = 1e-6
+CRUMB = 1e-9
 
 
 class Illegal(Exception):
@@ -15,9 +16,14 @@ class Illegal(Exception):
 
 
 def apart(crs, a, b):
-    """Distance on the plane, or by the haversine formula on a sphere of 6371.0088 km."""
+    """Distance on the plane, or by the haversine formula on a sphere of 6371.0088 km.
+
+    A place with two spellings is one: 180 and -180, and a pole with any longitude.
+    """
     if crs == "local":
         return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
+    if a[1] == b[1] and (abs(a[1]) == 90 or (a[0] - b[0]) % 360 == 0):
+        return 0.0
     (lon_a, lat_a), (lon_b, lat_b) = ([math.radians(v) for v in point] for point in (a, b))
     chord = (
         math.sin((lat_b - lat_a) / 2) ** 2
@@ -27,7 +33,7 @@ def apart(crs, a, b):
 
 
 def weight_of(problem):
-    """λ: the objective's, or one over the diagonal of the bounding box."""
+    """λ: the objective's, or one over the diagonal of the bounding box, the narrowest one on the globe."""
     given = (problem.get("objective") or {}).get("distance_weight")
     if given is not None:
         return given
@@ -35,8 +41,13 @@ def weight_of(problem):
     for uav in problem["uavs"]:
         points += [(uav["x_s"], uav["y_s"]), now(uav)]
     xs, ys = zip(*points, strict=True)
-    diagonal = apart(problem.get("crs", "local"), (min(xs), min(ys)), (max(xs), max(ys)))
-    return 1 / diagonal if diagonal else 1.0
+    if problem.get("crs", "local") == "local":
+        diagonal = apart("local", (min(xs), min(ys)), (max(xs), max(ys)))
+        return 1 / diagonal if diagonal else 1.0
+    # Every place may be the western end; the box that begins there ends with the place farthest to the east.
+    width, west = min((max((x - begin) % 360 for x in xs), begin) for begin in xs)
+    diagonal = apart("wgs84", (west, min(ys)), (west + width, max(ys)))
+    return 1 / diagonal if diagonal >= 1e-9 else 1.0
 
 
 def now(uav):
@@ -54,7 +65,8 @@ class Aircraft:
         self.speed, self.voyage = record["speed"], record["voyage"]
         self.flown = record.get("dis") or 0.0
         self.out = not record.get("ret")
-        self.hold = [float(amount) for amount in record["loadlist"]]
+        self.loaded = [float(amount) for amount in record["loadlist"]]
+        self.hold = list(self.loaded)
         self.clock = 0.0
 
 
@@ -73,6 +85,12 @@ def unloaded_by(craft, wanted, area, carried, given):
     return list(given)
 
 
+def without(amount, taken, whole):
+    """What is left of an amount; less than a billionth of the whole that it is a part of is nothing."""
+    left = amount - taken
+    return left if left >= CRUMB * whole else 0.0
+
+
 def replay(problem, assignment, delivered=None):
     """Reward, satisfaction, distance and remaining needs of a legal plan; raises Illegal otherwise.
 
@@ -82,8 +100,12 @@ def replay(problem, assignment, delivered=None):
     charge, must_return = objective.get("charge_return", False), objective.get("return_to_base", True)
     fleet = [Aircraft(record) for record in problem["uavs"]]
     areas = problem["targets"]
-    needs = [[float(amount) for amount in area["loadlist"]] for area in areas]
-    totals = [sum(row) for row in needs]
+    asked = [area["loadlist"] if area.get("requested") is None else area["requested"] for area in areas]
+    needs = [
+        [without(amount, 0.0, whole) for amount, whole in zip(area["loadlist"], row, strict=True)]
+        for area, row in zip(areas, asked, strict=True)
+    ]
+    totals = [sum(row) for row in asked]
     weight = weight_of(problem)
     satisfaction = distance = 0.0
     if len(assignment) > problem.get("max_steps", 5):
@@ -120,8 +142,8 @@ def replay(problem, assignment, delivered=None):
             distance += leg
             craft.place = there
             for k, amount in enumerate(unloaded):
-                craft.hold[k] -= amount
-                wanted[k] -= amount
+                craft.hold[k] = without(craft.hold[k], amount, craft.loaded[k])
+                wanted[k] = without(wanted[k], amount, asked[choice][k])
                 if amount > 0:
                     satisfaction += area["level"] * amount / totals[choice]
     if charge:

@@ -21,6 +21,7 @@ from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
 sys.path.append(str(Path(__file__).parents[2]))
 
 from app.domain.errors import InvalidParameters
+from app.domain.identifiers import fault_of
 from app.solvers.registry import parse_parameters
 
 LONGEST_S = 0.05
@@ -39,7 +40,7 @@ def breaks_rules(problem):
         return True
     for group, default in zip(groups, ("uav-", "area-"), strict=True):
         ids = [each.get("id") or f"{default}{number}" for number, each in enumerate(group, 1)]
-        if len(set(ids)) < len(ids) or not all(each.isprintable() for each in ids):
+        if len(set(ids)) < len(ids) or any(fault_of(each) is not None for each in ids):
             return True
     points = [
         (each[x], each[y])

@@ -67,6 +67,7 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
                 [target.x, target.y],
                 target_id=target.id,
                 level=target.level,
+                requested=list(target.loadlist if target.requested is None else target.requested),
                 needs=list(target.loadlist),
                 remaining=[0.0] * len(target.loadlist) if missing is None else list(missing.remaining),
                 reason=None if missing is None else missing.reason,

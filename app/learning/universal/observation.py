@@ -17,12 +17,25 @@ import numpy as np
 from app.learning.kernels import Float32s
 from app.learning.universal.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import ALLOWED, Episodes, compiled, leg_home, leg_to, verdict
+from app.simulation.simulator import (
+    ALLOWED,
+    Episodes,
+    compiled,
+    farthest,
+    latest,
+    left_of,
+    leg_home,
+    leg_to,
+    verdict,
+)
 
 FOLLOW_UPS = 16
 """Near targets considered for the visit after the next."""
 
-FORBIDDEN = -1e9
+LARGEST_LEVEL = 1e6
+"""Bound of the level of a target that needs nothing, against those that do: keeps single precision finite."""
+
+FORBIDDEN = -np.inf
 """Value of a visit that is not allowed."""
 
 
@@ -233,7 +246,7 @@ def observe(
         row[5] = unloaded / need if need > 0.0 else 0.0
         row[6] = unloaded / load if load > 0.0 else 0.0
         row[7] = need / arrays.need_total[p, j] if arrays.need_total[p, j] > 0.0 else 0.0
-        row[8] = arrays.level[p, j] / scale
+        row[8] = min(arrays.level[p, j] / scale, LARGEST_LEVEL)
         row[9] = clip((arrays.voyage[p, i] - reach) / extent, -1.0, 3.0)
         row[10] = home_then / extent
         row[11] = (d + home_then - home_now) / extent
@@ -346,11 +359,13 @@ def _follow_up(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: i
         then = outlook.near[p, j, q]
         leg = arrays.between[p, j, then]
         reach = flown + leg + (arrays.home[p, i, then] if arrays.return_to_base[p] else 0.0)
-        if reach > arrays.voyage[p, i] or clock + leg / arrays.speed[p, i] > arrays.deadline[p, then]:
+        arrival = clock + leg / arrays.speed[p, i]
+        if reach > farthest(arrays.voyage[p, i]) or arrival > latest(arrays.deadline[p, then]):
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
-            kept = episodes.load[b, i, k] - min(episodes.load[b, i, k], episodes.need[b, j, k])
+            load = episodes.load[b, i, k]
+            kept = left_of(load, min(load, episodes.need[b, j, k]), arrays.load[p, i, k])
             unloaded += min(kept, episodes.need[b, then, k])
         if unloaded > 0.0:
             earned = arrays.level[p, then] * unloaded / arrays.need_total[p, then] - arrays.weight[p] * leg

@@ -99,7 +99,7 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
     uavs = np.argsort(np.where(groups, rng.random(groups.shape), 2.0), axis=1)[:, : groups.sum(axis=1).max()]
     row = np.arange(count)[:, None]
     worthwhile = worth[row, targets] > -np.inf
-    need = np.where(episodes.need > 1e-9 * arrays.need, episodes.need, 0.0)[row, targets]
+    need = episodes.need[row, targets]
     pairs = (uavs[:, :, None], targets[:, None, :])
     left = ProblemArrays(
         start_target=arrays.start_target[0][pairs],
@@ -112,6 +112,7 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
         ret=arrays.ret[0][uavs] | ~groups[row, uavs],
         load=arrays.load[0][uavs],
         need=np.where(worthwhile[:, :, None], need, 0.0),
+        requested=arrays.requested[0][targets],
         need_total=arrays.need_total[0][targets],
         level=arrays.level[0][targets],
         deadline=arrays.deadline[0][targets],

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import TOLERANCE, compiled, compiled_free
+from app.solvers.column_generation.packing import worth
 from app.solvers.column_generation.pool import Pool, collect
 from app.solvers.local_search.routes import NONE, lay
 
@@ -155,7 +156,7 @@ def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Mea
     for need, load in zip(arrays.need[0].T, arrays.load[0, i], strict=True):
         if np.sort(need)[::-1][:visits].sum() > load:
             rows.append((need, 0.0, need, np.broadcast_to(load * (1.0 + tolerance), need.shape)))
-    weight, nothing = float(arrays.weight[0]), _AS_MUCH * float(arrays.level[0].max(initial=0.0))
+    weight, nothing = float(arrays.weight[0]), _AS_MUCH * float(worth(arrays).max(initial=0.0))
     charged = weight if arrays.charge_return[0] else 0.0
     columns = [np.column_stack([row[at] for row in rows] or [np.empty((len(start), 0))]) for at in (0, 2, 3)]
     first, amount, most = (np.ascontiguousarray(column, np.float64) for column in columns)

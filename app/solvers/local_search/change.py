@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled
+from app.simulation.simulator import compiled, left_of
 from app.solvers.local_search.routes import (
     DISTANCE,
     NONE,
@@ -287,7 +287,8 @@ def _load(arrays: ProblemArrays, routes: Routes, i: int, slot: int, k: int) -> f
     earlier = slot - routes.length.shape[0]
     if earlier < 0:
         return arrays.load[0, i, k]
-    return routes.load[earlier, k] - min(routes.load[earlier, k], routes.need[earlier, k])
+    unloaded = min(routes.load[earlier, k], routes.need[earlier, k])
+    return left_of(routes.load[earlier, k], unloaded, arrays.load[0, i, k])
 
 
 @compiled
@@ -295,7 +296,8 @@ def _need(arrays: ProblemArrays, routes: Routes, j: int, before: int, k: int) ->
     """What target `j` needs before a visit: what the visit before it there left."""
     if before == NONE:
         return arrays.need[0, j, k]
-    return routes.need[before, k] - min(routes.load[before, k], routes.need[before, k])
+    unloaded = min(routes.load[before, k], routes.need[before, k])
+    return left_of(routes.need[before, k], unloaded, arrays.requested[0, j, k])
 
 
 @compiled

@@ -1,0 +1,53 @@
+"""Amounts as an answer prints them: without the rounding errors of the sums that they come from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.domain.problem import ROUNDING
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import compiled
+
+_DIGITS = 9
+"""Decimal digits, from the first of what was requested on, to which an amount is rounded if it is near."""
+
+_ERROR = 1e-12
+"""Rounding error of a sum of amounts, relative to the largest of them."""
+
+
+def tidy(arrays: ProblemArrays, actions: Integers, delivered: Floats, needs: Floats) -> None:
+    """Write 0.2 for what the sums made 0.19999999999999998; an amount that is no rounding error away stays.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    actions, delivered
+        (S, M) joint actions and (S, M, K) what they unload, which is changed.
+    needs
+        (N, K) what is still needed at the end, which is changed.
+    """
+    requested = arrays.requested[0]
+    size = np.log10(np.where(requested > 0.0, requested, 1.0))
+    _tidy(arrays, actions, delivered, needs, 10.0 ** (_DIGITS - np.ceil(size)))
+
+
+@compiled
+def _tidy(arrays: ProblemArrays, actions: Integers, delivered: Floats, needs: Floats, scale: Floats) -> None:
+    n, materials = scale.shape
+    for s in range(actions.shape[0]):
+        for i in range(actions.shape[1]):
+            j = actions[s, i]
+            if j < n:
+                for k in range(materials):
+                    whole = max(arrays.requested[0, j, k], arrays.load[0, i, k])
+                    delivered[s, i, k] = _tidied(delivered[s, i, k], whole, scale[j, k])
+    for j in range(n):
+        for k in range(materials):
+            needs[j, k] = _tidied(needs[j, k], arrays.requested[0, j, k], scale[j, k])
+
+
+@compiled
+def _tidied(amount: float, whole: float, scale: float) -> float:
+    rounded = np.rint(amount * scale) / scale
+    return rounded if abs(rounded - amount) <= min(_ERROR * whole, ROUNDING * amount) else amount
