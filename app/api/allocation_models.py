@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.problem_models import ProblemModel, Whole, WireModel
+from app.domain.warnings import CODES as WARNING_CODES
 from app.solvers.registry import ALGORITHMS
 
 MAX_SEED = 2**53 - 1
@@ -150,6 +151,14 @@ class ProofModel(AnswerModel):
     proven: bool = Field(description="Whether the plan is the best there is")
 
 
+class WarningModel(AnswerModel):
+    """Something in the request that is taken as it is, but was probably not meant."""
+
+    pointer: str = Field(description="JSON pointer to it in the problem (RFC 6901)")
+    code: str = Field(description="What it is, for programs", json_schema_extra={"enum": list(WARNING_CODES)})
+    detail: str = Field(description="What it is, for people, with its numbers")
+
+
 class Allocation(AnswerModel):
     """A plan, what it earns, and how it was found."""
 
@@ -161,7 +170,7 @@ class Allocation(AnswerModel):
         description="One joint action a step: for each UAV the index of its target, or N for home"
     )
     reward: float = Field(description="satisfaction - distance_weight · distance")
-    satisfaction: float = Field(description="Sum over the visits of level · delivered / needed")
+    satisfaction: float = Field(description="Sum over the visits of level · delivered / requested")
     distance: float = Field(description="Total distance, legs home only if they are charged")
     distance_weight: float = Field(description="λ as it was used")
     bound: float | None = Field(
@@ -179,6 +188,10 @@ class Allocation(AnswerModel):
     )
     routes: list[RouteModel] = Field(description="One a UAV")
     unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
+    warnings: list[WarningModel] = Field(
+        default_factory=list,
+        description="What in the problem was probably not meant; nothing is refused for it",
+    )
     source_policy: SourcePolicyModel | None = Field(description="What was transferred, if anything")
     history: HistoryModel = Field(description="Reward against epoch; thinned evenly beyond 10,000")
     elapsed_s: float = Field(description="Seconds from the request's arrival to the plan")

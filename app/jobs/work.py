@@ -13,6 +13,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.domain.records import problem_from_record, to_record
+from app.domain.warnings import problem_warnings
 from app.jobs import bounding
 from app.jobs.answer_time import AnswerTime
 from app.jobs.model import Progress, WorkResult
@@ -114,6 +115,7 @@ def _result(
         "parameters": solution.parameters.model_dump(mode="json"),
         "seed": payload["seed"],
         **answer,
+        "warnings": to_record(problem_warnings(problem)),
         "proof": bounding.proof_answer(problem, solution.proof),
         **bounding.bound_answer(problem, answer["reward"], bound_limit_s, limit.bounding),
         "source_policy": None if source is None else asdict(source),
