@@ -82,6 +82,16 @@ def test_the_relaxation_is_that_of_all_routes(variant, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_the_level_of_an_area_that_needs_nothing_does_not_count(seed):
+    problem = problem_of("loads", seed)
+    problem = replace(problem, targets=tuple(replace(t, level=t.level / 100) for t in problem.targets))
+    met = replace(problem.targets[0], id="met", level=1e12, loadlist=(0.0,))
+    _, _, relaxed, _ = closed(problem)
+    _, _, beside, _ = closed(replace(problem, targets=(*problem.targets, met)))
+    assert beside.reward == pytest.approx(relaxed.reward, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_no_plan_exceeds_the_bound(variant, seed):
     problem = problem_of(variant, seed, n=5, steps=3)
