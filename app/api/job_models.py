@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from app.api.allocation_models import AnswerModel
 from app.api.problem_details import FieldError
+from app.api.problem_models import ProblemModel
 from app.jobs import model
 from app.jobs.model import Job, JobPage, JobStatus
 
@@ -92,6 +93,16 @@ def job_list(page: JobPage) -> JobList:
         progress = ProgressSummary(fraction=known.fraction, epoch=known.epoch, best_reward=known.best_reward)
         jobs.append(JobSummary(**_fields(job), progress=progress))
     return JobList(jobs=jobs, next_cursor=page.next_cursor)
+
+
+def problem_of(job: Job) -> ProblemModel:
+    """Return the problem that a job is about; a UAV that is where it started has no position of its own."""
+    record = job.payload["problem"]
+    uavs = [
+        {**uav, "x_c": None, "y_c": None} if (uav["x_c"], uav["y_c"]) == (uav["x_s"], uav["y_s"]) else uav
+        for uav in record["uavs"]
+    ]
+    return ProblemModel.model_validate({**record, "uavs": uavs})
 
 
 def result_of(job: Job) -> dict[str, Any] | None:

@@ -278,3 +278,24 @@ def test_job_that_was_cancelled_before_it_began_has_no_plan(client, problem, fol
     assert answers[0].status_code == 409
     assert answers[0].json()["type"] == "job-cancelled"
     assert answers[0].json()["job_id"] == queued
+
+
+def test_the_problem_of_a_job_is_the_one_that_was_sent(client, problem):
+    sent = {
+        **problem,
+        "objective": {"unloading": "planned", "distance_weight": 0.25},
+        "uavs": [{**problem["uavs"][0], "id": "moved", "x_c": 0.5, "dis": 1.5}, *problem["uavs"][1:]],
+    }
+    sent["targets"][0]["deadline"] = 40.0
+    answer = client.post("/allocate", json={**sent, "algorithm": "greedy"}).json()
+
+    found = client.get(f"/jobs/{answer['job_id']}/problem").json()
+
+    assert found["objective"] == sent["objective"]
+    assert found["uavs"][0] == {**sent["uavs"][0], "y_c": sent["uavs"][0]["y_s"]}
+    assert [uav["id"] for uav in found["uavs"][1:]] == [uav.get("id", f"uav-{n}") for n, uav in enumerate(sent["uavs"][1:], 2)]
+    assert "x_c" not in found["uavs"][1]
+    assert found["targets"][0]["deadline"] == 40.0
+    again = client.post("/allocate", json={**found, "algorithm": "greedy"}).json()
+    assert (again["assignment"], again["reward"]) == (answer["assignment"], answer["reward"])
+    assert client.get(f"/jobs/{'0' * 32}/problem").status_code == 404

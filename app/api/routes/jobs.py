@@ -8,12 +8,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Path, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.access.guard import key_is_valid
-from app.api.job_models import JobList, JobModel, job_list, job_response
+from app.api.job_models import JobList, JobModel, job_list, job_response, problem_of
 from app.api.library_models import JOB_ID_PATTERN
 from app.api.problem_details import responses
+from app.api.problem_models import ProblemModel
 from app.api.routes.parameters import Cursor
 from app.api.services import Served
 from app.api.stored_json import write
@@ -65,6 +67,20 @@ async def get_job(job_id: JobId, services: Served) -> Response:
     """Return a job: its progress and the best plan so far, at its end the result or the error."""
     job = await services.jobs.look(job_id)
     return job_response(job, await services.jobs.result_text(job_id) if job.status.finished else None)
+
+
+@router.get(
+    "/{job_id}/problem",
+    summary="Read the problem of a job",
+    response_model=ProblemModel,
+    response_model_exclude_defaults=True,
+    response_description="The problem, without what is the default anyway",
+    responses=responses("job-not-found", "invalid-request"),
+)
+async def get_job_problem(job_id: JobId, services: Served) -> ProblemModel:
+    """Return the problem that a job was given, as `POST /allocate` takes it; all ids are filled in."""
+    job = await services.jobs.get(job_id)
+    return await run_in_threadpool(problem_of, job)
 
 
 @router.get(

@@ -1,8 +1,8 @@
 /** Reward against something, a line an algorithm, as the paper's figures have it. */
 
 import uPlot from "../vendor/uplot/uplot.js";
+import { hue } from "./colours.js";
 import { h } from "./dom.js";
-import { hue } from "./plan.js";
 
 /**
  * Draw curves into an element, instead of what was there.

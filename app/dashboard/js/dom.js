@@ -39,7 +39,7 @@ export function number(value, digits = 4) {
 /** A number in at most so many significant digits, whole numbers in full. */
 export function shown(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (Number.isInteger(value)) return String(value);
+  if (Number.isInteger(value)) return String(value).replace("-", "−");
   const text = Number(value.toPrecision(Math.max(digits, Math.floor(Math.log10(Math.abs(value))) + 1)));
   return String(text).replace("-", "−");
 }

@@ -1,6 +1,7 @@
 /** Form fields made from JSON schemas, as the service describes its parameters. */
 
 import { h } from "./dom.js";
+import { resolved } from "./schema.js";
 
 /** A limit above this says nothing to anybody. */
 const NO_LIMIT = 1e9;
@@ -47,13 +48,6 @@ export function labelled(title, input, { pointer, hint } = {}) {
   const id = `error-${pointer?.replaceAll("/", "-")}`;
   input.setAttribute("aria-describedby", id);
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
-}
-
-/** Take out references and the null of what may be left open. */
-function resolved(schema, defs) {
-  const found = schema.$ref ? { ...defs[schema.$ref.split("/").at(-1)], ...schema } : schema;
-  const open = found.anyOf?.filter((each) => each.type !== "null");
-  return open?.length ? { ...found, ...resolved(open[0], defs), nullable: true, default: found.default, description: found.description } : found;
 }
 
 function makeField(name, schema, pointer, value, onchange) {

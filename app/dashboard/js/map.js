@@ -1,15 +1,18 @@
 /** The map: UAVs, areas and routes of the problem on screen, on a plane or on the globe. */
 
 import * as L from "../vendor/leaflet/leaflet.js";
+import { paint } from "./colours.js";
 import { Graticule } from "./graticule.js";
 import { shortAmounts, shown } from "./dom.js";
-import { hue, met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
-import { extent, move, place, position, remove } from "./problem.js";
+import { met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
+import { extent, move, place, position, remove, requestedBy } from "./problem.js";
 import { get, select, subscribe } from "./state.js";
 import { areaDot, areaSymbol, aside, uavDot, uavSymbol } from "./symbols.js";
 
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 
+/** The view in which symbols can be moved and deleted. */
+const EDITED_IN = "problem";
 const MANY = 150;
 const DOTS_FROM = 600;
 const SLOW_MS = 250;
@@ -40,6 +43,8 @@ export class DispatchMap {
     subscribe(["problem"], ({ problem }) => this.#onProblem(problem));
     subscribe(["answer", "incumbent", "answerProblem"], (_, changed) => (changed.includes("answer") ? this.#draw() : this.#drawSoon()));
     subscribe(["selection"], () => this.#markSelection());
+    subscribe(["view"], () => this.#onView());
+    new ResizeObserver(() => this.resized()).observe(element);
     element.addEventListener("keydown", (event) => this.#onKey(event));
   }
 
@@ -145,7 +150,8 @@ export class DispatchMap {
     const remade = !this.map || this.crs !== problem.crs;
     if (remade) this.#make(problem.crs);
     const far = box && this.map._loaded && !this.map.getBounds().intersects([[box.minY, box.minX], [box.maxY, box.maxX]]);
-    if (remade || far || !get().past.length) this.fit();
+    if (remade || far || this.opened !== get().opened) this.fit();
+    this.opened = get().opened;
     this.#draw();
   }
 
@@ -188,7 +194,7 @@ export class DispatchMap {
       line.bindTooltip(() => tip(`${uav.id}: ${visits.map(({ target }) => target.id).join(" → ")}`), { sticky: true, className: "tip" });
       this.routes.addLayer(line);
       const path = line.getElement();
-      path.style.setProperty("--hue", hue(index));
+      paint(path, uav.id);
       Object.assign(path.dataset, { uavId: uav.id, stops: visits.map(({ target }) => target.id).join("\n") });
       if (stops <= FEW_STOPS) visits.forEach(({ target }, at) => this.#drawOrder(uav, index, target, at + 1));
     }
@@ -197,10 +203,12 @@ export class DispatchMap {
   #drawOrder(uav, index, target, order) {
     const label = document.createElement("span");
     label.textContent = order;
-    label.style.setProperty("--hue", hue(index));
+    paint(label, uav.id);
     const beside = [-9 + 16 * (index % 3), 26];
     const icon = L.divIcon({ className: "order", html: label, iconSize: [15, 15], iconAnchor: beside });
-    this.routes.addLayer(L.marker(this.#latLng(target), { icon, interactive: false, keyboard: false, zIndexOffset: 500 }));
+    const marker = L.marker(this.#latLng(target), { icon, interactive: false, keyboard: false, zIndexOffset: 500 });
+    this.routes.addLayer(marker);
+    marker.getElement().dataset.uavId = uav.id;
   }
 
   #drawAreas(problem, answer) {
@@ -210,7 +218,7 @@ export class DispatchMap {
     for (const target of problem.targets) {
       const looks = { urgent: urgency(target.level, highest), met: share.get(target.id), size };
       const says = () => {
-        const lines = [`${target.id} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}`];
+        const lines = [`${target.id} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}${target.requested ? ` of ${shortAmounts(requestedBy(target))}` : ""}`];
         if (answer) lines.push(`${shown(100 * looks.met, 3)}% met`);
         if (target.deadline !== undefined) lines.push(`by ${shown(target.deadline)}`);
         return lines.join("\n");
@@ -222,14 +230,15 @@ export class DispatchMap {
   #drawUavs(problem) {
     const size = this.dots ? 10 : problem.uavs.length > 40 ? 12 : 17;
     const crowds = new Map();
-    problem.uavs.forEach((uav, index) => {
+    const { colours } = get();
+    for (const uav of problem.uavs) {
       const at = position(uav);
       const spot = `${at.x} ${at.y}`;
       const nth = crowds.get(spot) ?? 0;
       crowds.set(spot, nth + 1);
       const says = () => `${uav.id} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${shortAmounts(uav.loadlist)}`;
-      this.#addSymbol("uavs", uav, at, () => (this.dots ? uavDot : uavSymbol)(uav, index, size), aside(nth, size), { index, size, nth, ret: uav.ret, left: rangeShare(uav).toFixed(3) }, says);
-    });
+      this.#addSymbol("uavs", uav, at, () => (this.dots ? uavDot : uavSymbol)(uav, size), aside(nth, size), { colour: colours[uav.id], size, nth, ret: uav.ret, left: rangeShare(uav).toFixed(3) }, says);
+    }
   }
 
   /** Draw a symbol, or keep the one that shows the same. */
@@ -265,9 +274,14 @@ export class DispatchMap {
     this.#allowMoving(drawn);
   }
 
-  /** Let a symbol be dragged, unless what is drawn is no problem to edit; of very many only the one under the pointer. */
+  /** Whether what is drawn can be changed here: the problem in its own view; elsewhere a plan is looked at. */
+  #editable() {
+    return !this.given && get().view === EDITED_IN;
+  }
+
+  /** Let a symbol be dragged, where it can be changed; of very many only the one under the pointer. */
   #allowMoving({ marker }, asked = !this.dots) {
-    if (this.given) marker.dragging.disable();
+    if (!this.#editable()) marker.dragging.disable();
     else if (asked) marker.dragging.enable();
   }
 
@@ -280,6 +294,11 @@ export class DispatchMap {
     return base;
   }
 
+  #onView() {
+    this.stopPlacing();
+    for (const symbol of this.symbols.values()) this.#allowMoving(symbol);
+  }
+
   #markSelection() {
     const { selection } = get();
     for (const [key, { marker, element }] of this.symbols) {
@@ -289,8 +308,8 @@ export class DispatchMap {
       marker.setZIndexOffset(chosen ? 1000 : 0);
     }
     this.element.classList.toggle("one-route", selection?.kind === "uavs");
-    for (const path of this.element.querySelectorAll("path.route")) {
-      path.classList.toggle("selected", selection?.kind === "uavs" && path.dataset.uavId === selection.id);
+    for (const drawn of this.element.querySelectorAll("path.route, .order")) {
+      drawn.classList.toggle("selected", selection?.kind === "uavs" && drawn.dataset.uavId === selection.id);
     }
   }
 
@@ -315,7 +334,7 @@ export class DispatchMap {
   #onKey(event) {
     if (event.key === "Enter" && this.placing && event.target === this.element) return this.#onClick(this.map.getCenter());
     const { selection } = get();
-    if (!selection || this.given) return;
+    if (!selection || !this.#editable()) return;
     if (event.key === "Delete") remove(selection.kind, selection.id);
     if (event.altKey && NUDGES[event.key]) {
       event.preventDefault();

@@ -1,14 +1,6 @@
-/** What a plan looks like: where routes go, what areas get, which colour a UAV has. */
+/** What a plan looks like: where routes go, what areas get. */
 
-import { position } from "./problem.js";
-
-const GOLDEN_ANGLE = 137.508;
-const FIRST_HUES = [250, 30, 150, 330, 85, 200, 295, 55];
-
-/** Hue of a UAV's routes and symbol, far from its neighbours' in the list. */
-export function hue(index) {
-  return FIRST_HUES[index] ?? (index * GOLDEN_ANGLE) % 360;
-}
+import { position, requestedBy } from "./problem.js";
 
 /**
  * Routes of an answer, or of a list of joint actions, in one form.
@@ -48,16 +40,16 @@ function visitsOfAnswer(problem, answer) {
 }
 
 /**
- * How much of each area's need an answer meets, 0 to 1; an area that needs nothing is met.
+ * How much of what each area asked for it has, with what an answer brings, 0 to 1; an area that needs nothing is met.
  * @returns {Map<string, number>} by target id
  */
 export function met(problem, answer) {
   const remaining = new Map((answer?.unmet ?? []).map((each) => [each.target_id, sum(each.remaining)]));
   return new Map(
     problem.targets.map((target) => {
-      const need = sum(target.loadlist);
-      if (need === 0) return [target.id, 1];
-      return [target.id, answer ? 1 - (remaining.get(target.id) ?? 0) / need : 0];
+      const requested = sum(requestedBy(target));
+      if (requested === 0) return [target.id, 1];
+      return [target.id, 1 - (answer ? (remaining.get(target.id) ?? 0) : sum(target.loadlist)) / requested];
     }),
   );
 }

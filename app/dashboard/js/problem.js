@@ -1,18 +1,25 @@
 /** The problem on screen: making, editing, undoing. All of it in the API's own fields. */
 
-import { get, set } from "./state.js";
+import { change } from "./history.js";
+import { isAmounts } from "./schema.js";
+import { BEGINNING, get, select, set } from "./state.js";
 
-const MOST_UNDONE = 100;
+/** A problem with ids filled in and what is not set left out. */
+export function normalised({ uavs = [], targets = [], ...settings }) {
+  return { ...present(settings), uavs: named(uavs, "uav"), targets: named(targets, "area") };
+}
 
-/** A problem with ids and positions filled in, and nothing that the API does not know of a problem. */
-export function normalised(given) {
-  return {
-    max_steps: given.max_steps ?? 5,
-    crs: given.crs ?? "local",
-    objective: { distance_weight: null, return_to_base: true, charge_return: false, ...given.objective },
-    uavs: (given.uavs ?? []).map((uav, i) => ({ id: `uav-${i + 1}`, ...present(uav) })),
-    targets: (given.targets ?? []).map((target, j) => ({ id: `area-${j + 1}`, ...present(target) })),
-  };
+/** Items with ids: the service's own by place in the list, or the next that is free. */
+function named(items, stem) {
+  const taken = new Set(items.map(({ id }) => id));
+  return items.map((item, at) => {
+    const fields = present(item);
+    if (fields.id !== undefined) return fields;
+    let n = at + 1;
+    while (taken.has(`${stem}-${n}`)) n += 1;
+    taken.add(`${stem}-${n}`);
+    return { id: `${stem}-${n}`, ...fields };
+  });
 }
 
 function present(fields) {
@@ -29,30 +36,23 @@ export function materials(problem) {
   return (problem.uavs[0] ?? problem.targets[0])?.loadlist.length ?? 1;
 }
 
-/** Bring another problem on screen; what was found for the one before goes. */
+/** Bring another problem on screen; undoing brings back the one before with its plan and clock. */
 export function open(problem, name) {
-  const full = normalised(problem);
-  set({
-    problem: full, problemName: name, past: [], future: [],
-    answer: null, answerProblem: null, incumbent: null, violations: [], selection: null,
+  change({
+    problem: normalised(problem), problemName: name, opened: newOpening(), colours: {},
+    answer: null, answerProblem: null, mission: BEGINNING, incumbent: null, selection: null,
   });
 }
 
+/** What tells one opening of a problem from all others. */
+export function newOpening() {
+  return `${Date.now()} ${Math.random()}`;
+}
+
 /** Replace the problem by an edited one, which can be undone. */
-export function edit(change) {
-  const { problem, past } = get();
-  const next = { ...problem, ...change(problem) };
-  set({ problem: next, past: [...past, problem].slice(-MOST_UNDONE), future: [], violations: [] });
-}
-
-export function undo() {
-  const { problem, past, future } = get();
-  if (past.length) set({ problem: past.at(-1), past: past.slice(0, -1), future: [problem, ...future], violations: [] });
-}
-
-export function redo() {
-  const { problem, past, future } = get();
-  if (future.length) set({ problem: future[0], past: [...past, problem], future: future.slice(1), violations: [] });
+export function edit(changed) {
+  const { problem } = get();
+  change({ problem: { ...problem, ...changed(problem) } });
 }
 
 /** Change fields of a UAV or area; undefined takes a field out. @param {"uavs"|"targets"} kind */
@@ -86,7 +86,7 @@ export function place(kind, { x, y }) {
       ? { id, x_s: x, y_s: y, speed: last?.speed ?? 1, voyage: last?.voyage ?? reach(problem), loadlist }
       : { id, x, y, level: last?.level ?? 1, loadlist };
   edit((now) => ({ [kind]: [...now[kind], item] }));
-  set({ selection: { kind, id } });
+  select({ kind, id });
 }
 
 function freeId(items, stem) {
@@ -105,9 +105,18 @@ function reach(problem) {
 
 /** Give every UAV and area so many kinds of material. */
 export function setMaterials(count) {
-  const fitted = (items) =>
-    items.map((item) => ({ ...item, loadlist: Array.from({ length: count }, (_, k) => item.loadlist[k] ?? 0) }));
-  edit((problem) => ({ uavs: fitted(problem.uavs), targets: fitted(problem.targets) }));
+  const { fields } = get();
+  const fitted = (kind, items) => {
+    const names = Object.keys(fields[kind]).filter((name) => isAmounts(fields[kind][name]));
+    const amounts = (list) => Array.from({ length: count }, (_, k) => list[k] ?? 0);
+    return items.map((item) => ({ ...item, ...Object.fromEntries(names.filter((name) => item[name]).map((name) => [name, amounts(item[name])])) }));
+  };
+  edit((problem) => ({ uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets) }));
+}
+
+/** What an area asked for at first, an amount a material. */
+export function requestedBy(target) {
+  return target.requested ?? target.loadlist;
 }
 
 /** The box of all positions; null without any. */

@@ -4,20 +4,27 @@
  * Keys are listed in README.md.
  */
 
+/** A mission at the beginning of its plan: nothing has happened yet. */
+export const BEGINNING = Object.freeze({ clock: 0, lost: [], happened: {}, found: [], recall: false, outcome: null });
+
 const listeners = new Set();
 
 let state = Object.freeze({
   problem: null,
   problemName: "",
+  opened: "",
+  colours: {},
   past: [],
   future: [],
   job: null,
   answer: null,
   answerProblem: null,
+  mission: BEGINNING,
   incumbent: null,
   violations: [],
   selection: null,
   algorithms: [],
+  fields: null,
   settings: { version: "", tile_url: null, tile_attribution: "" },
   view: "problem",
 });

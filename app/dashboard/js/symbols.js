@@ -1,7 +1,8 @@
 /** Symbols on the map: an area with urgency and what is met, a UAV with its range left. */
 
+import { paint } from "./colours.js";
 import { h, svg } from "./dom.js";
-import { hue, rangeShare } from "./plan.js";
+import { rangeShare } from "./plan.js";
 
 /**
  * Draw an area: a disc in the colour of its urgency, a ring that fills with what is met.
@@ -26,17 +27,16 @@ export function areaDot({ urgent, met }) {
 }
 
 /** Draw a UAV among very many: a square in its colour, hollow where it is returning. */
-export function uavDot(uav, index) {
+export function uavDot(uav) {
   const drawn = h("i", { class: `dot uav${uav.ret ? " returning" : ""}` });
-  drawn.style.setProperty("--hue", hue(index));
-  return drawn;
+  return paint(drawn, uav.id);
 }
 
 /** Draw a UAV: a rotor cross in its colour, the range left as a bar below; hollow where it is returning. */
-export function uavSymbol(uav, index, size) {
+export function uavSymbol(uav, size) {
   const left = rangeShare(uav);
   const drawn = svg("svg", { viewBox: "0 0 24 28", width: size, height: (size * 28) / 24, class: `uav${uav.ret ? " returning" : ""}` });
-  drawn.style.setProperty("--hue", hue(index));
+  paint(drawn, uav.id);
   drawn.append(
     svg("path", { class: "arms", d: "M6 6 18 18M18 6 6 18" }),
     ...[[5, 5], [19, 5], [5, 19], [19, 19]].map(([cx, cy]) => svg("circle", { class: "rotor", cx, cy, r: 4 })),

@@ -1,7 +1,7 @@
 /** A task, and if there is one its plan, as a small picture. */
 
+import { paint } from "./colours.js";
 import { svg } from "./dom.js";
-import { hue } from "./plan.js";
 
 /**
  * Draw a task.
@@ -32,9 +32,7 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
       ...route.stops.map((stop) => [byId.get(stop.target_id).x, byId.get(stop.target_id).y]),
       [uav.x_s, uav.y_s],
     ].map((place) => at(place).map((value) => value.toFixed(1)).join(","));
-    const line = svg("polyline", { points: points.join(" "), class: "route", "data-uav": route.uav_id });
-    line.style.setProperty("--hue", hue(i));
-    picture.append(line);
+    picture.append(paint(svg("polyline", { points: points.join(" "), class: "route", "data-uav": route.uav_id }), route.uav_id, i));
   });
   const most = Math.max(1e-12, ...task.targets.map((target) => target.level));
   const unmet = new Set(answer?.unmet.map((each) => each.target_id));

@@ -1,7 +1,7 @@
 /** A timeline a UAV: its legs, what it does at its stops, and the way home. */
 
+import { paint } from "./colours.js";
 import { h, shortAmounts, shown } from "./dom.js";
-import { hue } from "./plan.js";
 import { Portions } from "./portions.js";
 import { select } from "./state.js";
 
@@ -13,7 +13,7 @@ import { select } from "./state.js";
  */
 export function timeline(problem, answer) {
   const targets = new Map(problem.targets.map((target) => [target.id, target]));
-  const rows = problem.uavs.map((uav, index) => ({ uav, index, ...timesOf(uav, answer.routes[index], targets) })).filter(({ stops }) => stops.length);
+  const rows = problem.uavs.map((uav, index) => ({ uav, ...timesOf(uav, answer.routes[index], targets) })).filter(({ stops }) => stops.length);
   const end = Math.max(0, ...rows.map(({ home }) => home)) || 1;
   const share = (time) => `${(100 * time) / end}%`;
   const bar = (kind, from, to, title) => {
@@ -22,9 +22,8 @@ export function timeline(problem, answer) {
     made.style.width = share(to - from);
     return made;
   };
-  const row = ({ uav, index, stops, home }) => {
-    const track = h("div", { class: "track" });
-    track.style.setProperty("--hue", hue(index));
+  const row = ({ uav, stops, home }) => {
+    const track = paint(h("div", { class: "track" }), uav.id);
     stops.forEach((stop, n) => {
       track.append(bar("leg", stop.left, stop.arrival, `to ${stop.id}`));
       const at = bar("visit", stop.arrival, stop.done, `${n + 1}. ${stop.id} at ${shown(stop.arrival)}: ${shortAmounts(stop.delivered)}`);

@@ -1,0 +1,120 @@
+/** Cells of a CSV file (RFC 4180, and what programs write instead) and their numbers and texts. */
+
+import { FormatError } from "./error.js";
+
+/** Separators that are looked for, in this order. */
+const SEPARATORS = [",", ";", "\t", "|"];
+/** What a spreadsheet takes for a formula; such a text gets an apostrophe in front, and one more where it has some. */
+const FORMULA = /^'*[=+\-@\t\r]/;
+const ESCAPED = /^'+[=+\-@\t\r]/;
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+
+/** Write rows of values; texts are kept from becoming formulas. @param {(string | number | boolean)[][]} rows */
+export function toCells(rows) {
+  return rows.map((cells) => cells.map(written).join(",")).join("\r\n").concat("\r\n");
+}
+
+function written(value) {
+  let text = String(value);
+  if (typeof value === "string" && FORMULA.test(text)) text = `'${text}`;
+  return /[",;|\t\r\n]|^\s|\s$/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+/** A text as it was before it was kept from becoming a formula. */
+export function plainText(text) {
+  return ESCAPED.test(text) ? text.slice(1) : text;
+}
+
+/**
+ * Rows of a table whose first line names its columns.
+ * @param {string} text
+ * @param {string} needed a column that has to be there
+ * @returns {{separator: string, columns: string[], rows: {line: number, cells: string[]}[]}} columns in lower case;
+ *   lines are those of the file, from 1; blank rows and a row of HXL tags are left out
+ * @throws {FormatError}
+ */
+export function table(text, needed) {
+  const told = /^\s*"?sep=(.)"?[ \t]*(\r\n|\n|\r)/i.exec(text);
+  const body = told ? text.slice(told[0].length) : text;
+  const before = told ? told[0].split(/\r\n|\n|\r/).length - 1 : 0;
+  const separator = told ? told[1] : separatorOf(body, needed);
+  const [head, ...rows] = [...rowsOf(body, separator, before)].filter(({ cells }) => cells.some((cell) => cell.trim()));
+  if (!head) throw new FormatError("it is empty");
+  const columns = head.cells.map((name) => name.trim().toLowerCase());
+  if (!columns.includes(needed)) {
+    const names = columns.filter(Boolean).slice(0, 8).join(", ");
+    throw new FormatError(`line ${head.line}: it has to name the columns, and \`${needed}\` is not among them (found: ${names})`);
+  }
+  const twice = columns.find((name, at) => name && columns.indexOf(name) !== at);
+  if (twice) throw new FormatError(`line ${head.line}: two columns are named \`${twice}\``);
+  for (const { line, cells } of rows) {
+    if (cells.slice(columns.length).some((cell) => cell.trim())) throw new FormatError(`line ${line}: it has ${cells.length} cells for ${columns.length} columns`);
+  }
+  return { separator, columns, rows: rows.filter(({ cells }) => !isTags(cells)) };
+}
+
+/** A row that humanitarian data has below the names (HXL): each cell that is filled is a tag. */
+function isTags(cells) {
+  const filled = cells.filter((cell) => cell.trim());
+  return filled.every((cell) => /^\s*#[a-z]/i.test(cell));
+}
+
+function separatorOf(text, needed) {
+  const heads = SEPARATORS.map((separator) => {
+    for (const { cells } of rowsOf(text, separator, 0, true)) if (cells.some((cell) => cell.trim())) return { separator, cells };
+    return { separator, cells: [] };
+  });
+  const names = ({ cells }) => cells.some((cell) => cell.trim().toLowerCase() === needed);
+  return (heads.find(names) ?? heads.reduce((a, b) => (b.cells.length > a.cells.length ? b : a))).separator;
+}
+
+/** Rows with the line they begin at; a cell in quotes keeps its spaces. @param {boolean} lax ends quietly where it cannot go on */
+function* rowsOf(text, separator, before, lax = false) {
+  const apart = separator.replace(/[|\\^$.*+?()[\]{}]/g, "\\$&");
+  const pattern = new RegExp(`(?: *"((?:[^"]|"")*)" *|([^"${apart}\\r\\n]*))(${apart}|\\r\\n|\\n|\\r|$)`, "gy");
+  let line = before + 1;
+  let row = { line, cells: [] };
+  for (let found = pattern.exec(text); found; found = pattern.exec(text)) {
+    const [, quoted, bare, end] = found;
+    row.cells.push(quoted === undefined ? bare.trim() : quoted.replaceAll('""', '"'));
+    line += quoted?.match(/\r\n|\n|\r/g)?.length ?? 0;
+    if (end === separator) continue;
+    yield row;
+    if (end === "") return;
+    line += 1;
+    row = { line, cells: [] };
+  }
+  if (!lax) throw new FormatError(`line ${line}: a quote is out of place`);
+}
+
+/** Reads the numbers of one file, whose decimals are either all points or all commas. */
+export class Numbers {
+  /** @param {string} separator of the file's cells */
+  constructor(separator) {
+    this.separator = separator;
+    this.point = null;
+    this.comma = null;
+  }
+
+  /** @throws {FormatError} where a cell is no number */
+  read(text, line, column) {
+    const cell = { text: text.trim(), line, column };
+    const plain = cell.text.replace("\u2212", "-");
+    const decimal = /[.,]/.exec(plain)?.[0];
+    if (decimal === ",") {
+      if (this.separator === ",") this.#refuse(cell, "has a decimal comma, in a file with commas between the cells");
+      this.comma ??= cell;
+    } else if (decimal === ".") this.point ??= cell;
+    if (decimal && this.point && this.comma) {
+      const [other, has] = decimal === "," ? [this.point, "point"] : [this.comma, "comma"];
+      this.#refuse(cell, `is ambiguous: line ${other.line} has a decimal ${has}, ${other.text}`);
+    }
+    const value = decimal === "," ? plain.replace(",", ".") : plain;
+    if (!NUMBER.test(value) || !Number.isFinite(Number(value))) this.#refuse(cell, "is no number");
+    return Number(value);
+  }
+
+  #refuse({ text, line, column }, why) {
+    throw new FormatError(`line ${line}: \`${column}\` ${why}: ${text}`);
+  }
+}

@@ -1,0 +1,2 @@
+/** A file that cannot be read; the message says where and what is wrong. */
+export class FormatError extends Error {}

@@ -1,0 +1,126 @@
+/** A problem as GeoJSON (RFC 7946): points with the service's fields as properties, settings as a member. */
+
+import { position } from "../problem.js";
+import { isAmounts } from "../schema.js";
+import { FormatError } from "./error.js";
+
+const KINDS = { uav: "uavs", area: "targets" };
+/** Names of longitude and latitude on WGS 84. */
+const DEGREES = /(CRS84h?|EPSG:[\d.]*:?(4326|4979))$/i;
+
+export function toGeoJson(problem, fields) {
+  const { uavs, targets, ...rest } = problem;
+  const settings = { ...rest, crs: rest.crs ?? fields.settings.crs.default };
+  const point = ({ x, y }, kind, { id, ...properties }) => ({
+    type: "Feature", id, geometry: { type: "Point", coordinates: [x, y] }, properties: { kind, ...properties },
+  });
+  const features = [
+    ...uavs.map((uav) => point(position(uav), "uav", uav)),
+    ...targets.map(({ x, y, ...target }) => point({ x, y }, "area", target)),
+  ];
+  return `${JSON.stringify({ type: "FeatureCollection", settings, features }, null, 2)}\n`;
+}
+
+/**
+ * Read a problem out of a FeatureCollection.
+ * @param {object} collection
+ * @param {object} present problem, whose settings hold where the collection has none
+ * @param {object} fields as `fieldsOf` gives them
+ * @returns {{problem: object, notices: string[]}}
+ * @throws {FormatError}
+ */
+export function fromGeoJson(collection, present, fields) {
+  const { features, settings } = collection;
+  if (!Array.isArray(features)) throw new FormatError("it has no list `features`");
+  const { uavs: _u, targets: _t, ...held } = present;
+  const problem = { ...(settings ?? { ...held, crs: "wgs84" }), uavs: [], targets: [] };
+  if (problem.crs === "wgs84") onGlobe(collection.crs);
+  const notices = [];
+  const foreign = new Set();
+  features.forEach((feature, at) => {
+    const { kind: given, ...properties } = feature?.properties ?? {};
+    const name = nameOf(feature, at);
+    if (!feature?.geometry) return notices.push(`${name} has no geometry and was left out`);
+    const kind = KINDS[String(given ?? "").toLowerCase()];
+    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is uav or area`);
+    const item = {};
+    for (const [field, value] of Object.entries(properties)) {
+      if (field === "id" || value === null) continue;
+      if (field in fields[kind]) item[field] = isAmounts(fields[kind][field]) ? listOf(value) : value;
+      else foreign.add(field);
+    }
+    const [x, y] = placeOf(feature.geometry, name, notices);
+    if (problem.crs === "wgs84" && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
+    const id = feature.id ?? properties.id;
+    if (id !== undefined && id !== null) item.id = String(id);
+    problem[kind].push(placed(kind, item, x, y));
+  });
+  if (foreign.size) notices.push(`Attributes that are no fields of a problem were left out: ${[...foreign].join(", ")}`);
+  return { problem, notices };
+}
+
+/** An item at its place: a UAV that has a position of its own has that there, any other its starting point. */
+function placed(kind, item, x, y) {
+  if (kind === "targets") return { ...item, x, y };
+  return { ...item, [item.x_c === undefined ? "x_s" : "x_c"]: x, [item.y_c === undefined ? "y_s" : "y_c"]: y };
+}
+
+function nameOf(feature, at) {
+  const { id, name, Name } = feature?.properties ?? {};
+  const called = [feature?.id, id, name, Name].find((each) => each !== undefined && each !== null && each !== "");
+  return `feature ${at + 1}${called === undefined ? "" : ` (${called})`}`;
+}
+
+/** Refuse coordinates that are no degrees of WGS 84; without a `crs` they are (RFC 7946, 4). */
+function onGlobe(crs) {
+  const name = crs?.properties?.name ?? crs?.properties?.code ?? crs?.properties?.href;
+  if (crs === undefined || crs === null || DEGREES.test(String(name ?? ""))) return;
+  throw new FormatError(`its \`crs\` is ${name ?? JSON.stringify(crs)}: save it with longitude and latitude on WGS 84 (EPSG:4326)`);
+}
+
+/** A list, which some programs save as its text. */
+function listOf(value) {
+  if (typeof value !== "string") return value;
+  try {
+    return JSON.parse(value);
+  } catch {
+    return value;
+  }
+}
+
+/** Where a feature is; of a polygon the middle, which is said. */
+function placeOf({ type, coordinates }, name, notices) {
+  if (type === "Point") return pair(coordinates, name);
+  if (type === "MultiPoint" && coordinates?.length === 1) return pair(coordinates[0], name);
+  if (type === "Polygon" || type === "MultiPolygon") {
+    const rings = (type === "Polygon" ? [coordinates?.[0]] : (coordinates ?? []).map((polygon) => polygon?.[0])).filter((ring) => ring?.length);
+    if (!rings.length) throw new FormatError(`${name} is an empty ${type}`);
+    const middles = rings.map((ring) => middleOf(ring.map((place) => pair(place, name))));
+    notices.push(`${name} is a ${type}: its middle was taken`);
+    return middles.reduce((a, b) => (b.area > a.area ? b : a)).place;
+  }
+  const many = type === "MultiPoint" ? ` of ${coordinates?.length ?? 0} points` : "";
+  throw new FormatError(`${name} is a ${type}${many}: a UAV or an area is one point`);
+}
+
+function pair(coordinates, name) {
+  const [x, y] = Array.isArray(coordinates) ? coordinates : [];
+  if (!Number.isFinite(x) || !Number.isFinite(y)) throw new FormatError(`${name} has coordinates that are no numbers: ${JSON.stringify(coordinates)}`);
+  return [x, y];
+}
+
+/** The centroid of a ring and its area; of one without an area the mean of its corners. */
+function middleOf(ring) {
+  const [[x0, y0]] = ring;
+  let [area, sx, sy] = [0, 0, 0];
+  ring.forEach(([ax, ay], at) => {
+    const [bx, by] = ring[(at + 1) % ring.length];
+    const part = (ax - x0) * (by - y0) - (bx - x0) * (ay - y0);
+    area += part;
+    sx += part * (ax + bx - 2 * x0);
+    sy += part * (ay + by - 2 * y0);
+  });
+  const mean = (axis) => ring.reduce((sum, corner) => sum + corner[axis], 0) / ring.length;
+  const place = area ? [x0 + sx / (3 * area), y0 + sy / (3 * area)] : [mean(0), mean(1)];
+  return { area: Math.abs(area), place: place.map((value) => Number(value.toFixed(7))) };
+}

@@ -1,0 +1,43 @@
+/** Undo and redo: a step holds what belongs together, the problem, its plan, the clock of the mission and the colours. */
+
+import { BEGINNING, get, set } from "./state.js";
+
+const MOST_UNDONE = 100;
+const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "mission", "colours"];
+
+/** What is on screen, as a step. */
+export function present() {
+  const state = get();
+  return Object.fromEntries(PARTS.map((part) => [part, state[part]]));
+}
+
+/** Replace what is on screen, with a way back to what it was. @param {object} patch of the store */
+export function change(patch) {
+  const { problem, answer, past } = get();
+  const worth = problem && (answer || problem.uavs.length || problem.targets.length);
+  set({ violations: [], ...patch, past: worth ? [...past, present()].slice(-MOST_UNDONE) : past, future: [] });
+}
+
+/** Bring a plan on screen, with the problem that it answers. @param {object} [rest] of the store */
+export function showPlan(problem, answer, rest = {}) {
+  const shown = { answer, answerProblem: problem, incumbent: null, mission: BEGINNING, ...rest };
+  // A first plan takes nothing away: what is undone then is the newest edit.
+  if (get().answer || ("problem" in rest && rest.problem !== get().problem)) change(shown);
+  else set(shown);
+}
+
+export function undo() {
+  const { past, future } = get();
+  if (past.length) goTo(past.at(-1), past.slice(0, -1), [present(), ...future]);
+}
+
+export function redo() {
+  const { past, future } = get();
+  if (future.length) goTo(future[0], [...past, present()], future.slice(1));
+}
+
+function goTo(step, past, future) {
+  const { selection } = get();
+  const there = selection && step.problem[selection.kind].some(({ id }) => id === selection.id);
+  set({ ...step, past, future, incumbent: null, violations: [], selection: there ? selection : null });
+}

@@ -1,0 +1,45 @@
+/** What the service says of a problem's fields in `/openapi.json`: the page has no list of its own. */
+
+/** Take out references and the null of what may be left open. */
+export function resolved(schema, defs) {
+  const found = schema.$ref ? { ...defs[schema.$ref.split("/").at(-1)], ...schema } : schema;
+  const open = found.anyOf?.filter((each) => each.type !== "null");
+  return open?.length ? { ...found, ...resolved(open[0], defs), nullable: true, default: found.default, description: found.description } : found;
+}
+
+/**
+ * The fields of a problem.
+ * @param {object} openapi the document
+ * @returns {{uavs: object, targets: object, settings: object, request: object, defs: object}} JSON schemas by name, references
+ *   taken out: of a UAV, of an area (`needed`: it has no default), of the problem besides its lists, and of `POST /allocate` besides the problem
+ */
+export function fieldsOf(openapi) {
+  const defs = openapi.components.schemas;
+  const all = (properties) => Object.fromEntries(Object.entries(properties).map(([name, schema]) => [name, resolved(schema, defs)]));
+  const { uavs, targets, ...settings } = all(defs.ProblemModel.properties);
+  const item = (list) => {
+    const { properties, required = [] } = resolved(list.items, defs);
+    return Object.fromEntries(Object.entries(all(properties)).map(([name, schema]) => [name, { ...schema, needed: required.includes(name) }]));
+  };
+  const request = Object.entries(all(defs.AllocationRequest.properties)).filter(([name]) => !(name in defs.ProblemModel.properties));
+  for (const [name, schema] of Object.entries(settings)) if (schema.properties) settings[name] = { ...schema, properties: all(schema.properties) };
+  return { uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request), defs };
+}
+
+/** Whether a field holds one amount a material. */
+export function isAmounts(schema) {
+  return schema.type === "array" && ["number", "integer"].includes(schema.items?.type);
+}
+
+/** What a value has to be, where it is not that; null where it is. */
+export function wanted(value, schema) {
+  if (schema.enum) return schema.enum.includes(value) ? null : `one of ${schema.enum.join(", ")}`;
+  if (schema.const !== undefined) return value === schema.const ? null : String(schema.const);
+  if (schema.type === "number" || schema.type === "integer") return Number.isFinite(value) ? null : "a number";
+  if (schema.type === "boolean") return typeof value === "boolean" ? null : "true or false";
+  if (schema.type === "string") return typeof value === "string" ? null : "a text";
+  if (isAmounts(schema)) return Array.isArray(value) && value.every(Number.isFinite) ? null : "a list of numbers";
+  if (schema.type === "array") return Array.isArray(value) ? null : "a list";
+  if (schema.type === "object") return value && typeof value === "object" && !Array.isArray(value) ? null : "an object";
+  return null;
+}
