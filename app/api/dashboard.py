@@ -1,4 +1,4 @@
-"""The dispatch dashboard: its page at ``/``, its files, and what of the settings it has to know."""
+"""The dispatch dashboard: its page at ``/``, its files, its icon, and what of the settings it has to know."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from app.api.security_headers import page_policy
 from app.settings import Settings
 
 FOLDER = "/dashboard"
+_ICON = "/favicon.ico"
+"""What a browser asks for where a page names no icon, such as the page to print."""
 _FILES = Path(app.__file__).parent / "dashboard"
 # A browser asks each time whether a file has changed: after an update no old module meets a new one.
 _FRESH = {"Cache-Control": "no-cache"}
@@ -52,9 +54,13 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
     async def show_dashboard(request: Request) -> Response:  # noqa: ARG001 - a route's signature
         return FileResponse(_FILES / "index.html", headers={"Content-Security-Policy": policy, **_FRESH})
 
+    async def show_icon(request: Request) -> Response:  # noqa: ARG001 - a route's signature
+        return FileResponse(_FILES / "icon.svg", headers=_FRESH)
+
     async def tell_settings(request: Request) -> Response:  # noqa: ARG001 - a route's signature
         return JSONResponse(known, headers=_FRESH)
 
     application.add_route("/", show_dashboard, include_in_schema=False)
+    application.add_route(_ICON, show_icon, include_in_schema=False)
     application.add_route(f"{FOLDER}/settings.json", tell_settings, include_in_schema=False)
     application.mount(FOLDER, _Files(directory=_FILES))

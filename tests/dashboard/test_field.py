@@ -60,7 +60,7 @@ def test_state_at_a_moment_is_the_specifications(page, service, example, time):
     assert {target["id"]: target["loadlist"] for target in now["targets"]} == {
         name: pytest.approx(need, abs=1e-9) for name, need in needs.items()
     }
-    crs = problem["crs"]
+    crs = problem.get("crs", "local")
     for uav in now["uavs"]:
         is_at = uavs[uav["id"]]
         assert uav["loadlist"] == pytest.approx(is_at["load"], abs=1e-9)

@@ -2,6 +2,7 @@
 
 import { ApiError, follow, json } from "./api.js";
 import { forgetErrors, notify } from "./dom.js";
+import { showPlan } from "./history.js";
 import { get, set } from "./state.js";
 
 /** The request for the problem on screen. An objective that is the API's default is left out. */
@@ -14,13 +15,35 @@ export function requestOf(problem, how) {
  * @param {object} how algorithm, parameters, seed, time_limit_s and what else `POST /allocate` takes
  */
 export async function allocate(how) {
-  const { problem } = get();
+  const { problem, opened } = get();
   forgetErrors();
-  set({ violations: [], answer: null, answerProblem: null, incumbent: null, job: { id: null, status: "sending", algorithm: how.algorithm, fraction: 0, epoch: null, best_reward: null, trace: [], startedAt: performance.now() } });
-  try {
+  set({ violations: [], incumbent: null, job: begun({ id: null, status: "sending", algorithm: how.algorithm }) });
+  await said(async () => {
     const job = await json("allocate", { method: "POST", body: requestOf(problem, how), headers: { Prefer: "respond-async" } });
     take({ id: job.id, status: job.status });
-    end(problem, await follow(job.id, (progress) => onProgress(problem, progress), () => take({ status: "reconnecting" })));
+    await followed(job.id, problem, opened);
+  });
+}
+
+/** Follow a job that goes on, as this page was loaded again or has opened it. */
+export async function resume(id, problem, algorithm = null) {
+  const { opened } = get();
+  set({ incumbent: null, job: begun({ id, status: "reconnecting", algorithm }) });
+  await said(() => followed(id, problem, opened));
+}
+
+function begun(fields) {
+  return { fraction: 0, epoch: null, best_reward: null, trace: [], startedAt: Date.now(), ...fields };
+}
+
+async function followed(id, problem, opened) {
+  end(problem, opened, await follow(id, (progress) => onProgress(problem, progress), () => take({ status: "reconnecting" })));
+}
+
+/** Do it; what goes wrong is said in the job. */
+async function said(act) {
+  try {
+    await act();
   } catch (error) {
     if (!(error instanceof ApiError)) console.error(error);
     const wait = error.retryAfter ? ` Try again in ${error.retryAfter} s.` : "";
@@ -57,17 +80,20 @@ function onProgress(problem, progress) {
   const { job, incumbent } = get();
   const { fraction, epoch = null, best_reward = null, assignment } = progress;
   const rose = best_reward !== null && best_reward !== job.trace.at(-1)?.reward;
-  const point = { t: (performance.now() - job.startedAt) / 1000, epoch, reward: best_reward };
+  const point = { t: (Date.now() - job.startedAt) / 1000, epoch, reward: best_reward };
   const status = job.status === "stopping" ? "stopping" : (progress.status ?? "running");
   take({ status, fraction, epoch, best_reward, trace: rose ? [...job.trace, point] : job.trace });
   if (assignment && JSON.stringify(assignment) !== JSON.stringify(incumbent?.assignment)) set({ incumbent: { problem, assignment } });
 }
 
-function end(problem, job) {
+function end(problem, opened, job) {
   const { trace, startedAt } = get().job;
-  const last = { t: (performance.now() - startedAt) / 1000, epoch: job.progress.epoch, reward: job.result?.reward ?? null };
+  const last = { t: (Date.now() - startedAt) / 1000, epoch: job.progress.epoch, reward: job.result?.reward ?? null };
   take({ status: job.status, error: job.error?.detail, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
-  set({ incumbent: null, answer: job.result, answerProblem: job.result && problem, violations: job.error?.errors ?? [] });
+  set({ incumbent: null, violations: job.error?.errors ?? [] });
   if (job.error && get().view !== "allocate") notify(job.error.detail, "error");
   if (!job.error && !job.result) notify("The job was cancelled before it had a plan");
+  if (!job.result) return;
+  if (get().opened === opened) showPlan(problem, job.result);
+  else notify("The plan of the problem before is ready: it is among the recent plans");
 }

@@ -2,6 +2,8 @@
 
 const KEY = "allocator-key";
 const RETRY_MS = 1000;
+/** A stream that is silent so long is cut off: the service says something every 15 s. */
+const SILENCE_MS = 40_000;
 /** What a service answers that will be back: too busy, starting, or behind a gateway that does not reach it. */
 const PASSING = new Set([0, 429, 502, 503, 504]);
 let askForKey = async () => null;
@@ -136,16 +138,32 @@ export async function follow(id, listen, lost = () => {}) {
 
 /** Server-sent events of a stream of bytes (EventSource can send no key). */
 async function* events(stream) {
-  const reader = stream.pipeThrough(new TextDecoderStream()).getReader();
+  const reader = stream.getReader();
+  const decoder = new TextDecoder();
   let text = "";
-  for (;;) {
-    const { value, done } = await reader.read();
-    if (done) return;
-    text = (text + value).replace(/\r\n/g, "\n");
-    for (let end = text.indexOf("\n\n"); end >= 0; end = text.indexOf("\n\n")) {
-      yield parsed(text.slice(0, end));
-      text = text.slice(end + 2);
+  try {
+    for (;;) {
+      const { value, done } = await heard(reader);
+      if (done) return;
+      text = (text + decoder.decode(value, { stream: true })).replace(/\r\n/g, "\n");
+      for (let end = text.indexOf("\n\n"); end >= 0; end = text.indexOf("\n\n")) {
+        yield parsed(text.slice(0, end));
+        text = text.slice(end + 2);
+      }
     }
+  } finally {
+    void reader.cancel().catch(() => {});
+  }
+}
+
+/** Read on, but not for ever: a link that is gone does not always say so. */
+async function heard(reader) {
+  let timer = null;
+  const silence = new Promise((_, reject) => { timer = setTimeout(() => reject(new ApiError(0, { detail: "The service has gone silent" })), SILENCE_MS); });
+  try {
+    return await Promise.race([reader.read(), silence]);
+  } finally {
+    clearTimeout(timer);
   }
 }
 

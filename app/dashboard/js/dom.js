@@ -68,15 +68,20 @@ export function forgetErrors() {
   document.getElementById("alerts").replaceChildren();
 }
 
-/** Tell something at the page's edge; it goes after a while, or when it is closed. @param {"info"|"error"} tone */
-export function notify(text, tone = "info") {
+/**
+ * Tell something at the page's edge; it goes after a while, or when it is closed.
+ * @param {string} text
+ * @param {"info"|"error"} [tone]
+ * @param {{title: string, act: () => void}} [offer] a button in it
+ */
+export function notify(text, tone = "info", offer = null) {
   const place = document.getElementById(tone === "error" ? "alerts" : "news");
   for (const same of [...place.children]) if (same.dataset.text === text) same.remove();
   const close = h("button", { type: "button", class: "quiet", "aria-label": "Close this message", onclick: () => notice.remove() }, "×");
-  const notice = h("div", { class: `notice ${tone}`, dataset: { text } }, h("p", {}, text), close);
+  const notice = h("div", { class: `notice ${tone}`, dataset: { text } }, h("p", {}, text), offer && h("button", { type: "button", class: "quiet", onclick: () => { notice.remove(); offer.act(); } }, offer.title), close);
   place.append(notice);
   const end = () => (notice.matches(":hover, :focus-within") ? setTimeout(end, 2_000) : notice.remove());
-  setTimeout(end, tone === "error" ? 12_000 : 5_000);
+  setTimeout(end, tone === "error" || offer ? 12_000 : 5_000);
 }
 
 /** Hand a text or blob to the user as a file. */

@@ -62,9 +62,9 @@ function complete(problem, fields, notices) {
   };
   const items = (kind) => {
     const found = problem[kind].map((item, at) => {
-      const id = typeof item?.id === "number" ? String(item.id) : item?.id;
-      const name = `${CALLED[kind]} ${id ?? at + 1}`;
-      const kept = checked({ ...item, id }, fields[kind], name);
+      const named = typeof item?.id === "number" ? { ...item, id: String(item.id) } : item;
+      const name = `${CALLED[kind]} ${named?.id ?? at + 1}`;
+      const kept = checked(named, fields[kind], name);
       const missing = Object.keys(fields[kind]).find((field) => fields[kind][field].needed && !(field in kept));
       if (missing) throw new FormatError(`${name} has no \`${missing}\``);
       return kept;

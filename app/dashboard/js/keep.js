@@ -117,13 +117,19 @@ async function claim() {
 
 /** Keep what is on screen from now on. */
 export function keepMission() {
-  subscribe(KEPT_KEYS, () => {
+  let followed = null;
+  subscribe(KEPT_KEYS, ({ job }, keys) => {
+    const now = `${job?.id} ${job?.status}`;
+    // How far a job has come, the service tells again.
+    if (keys.every((key) => key === "job") && now === followed) return;
+    followed = now;
     changed += 1;
     mark();
     save();
   });
   addEventListener("beforeunload", (event) => {
-    if (changed === kept) return;
+    const { past, answer } = get();
+    if (changed === kept || !(past.length || answer)) return;
     // The browser asks; what is started here it still completes.
     void write();
     event.preventDefault();
@@ -141,9 +147,10 @@ function save() {
   saving ??= (async () => {
     while (changed !== kept) {
       const before = kept;
+      const began = performance.now();
       await write();
       if (kept === before) break; // it cannot be kept; the next change tries again
-      await new Promise((resolve) => setTimeout(resolve, REST_MS));
+      await new Promise((resolve) => setTimeout(resolve, Math.max(REST_MS, 4 * (performance.now() - began))));
     }
     saving = null;
   })();

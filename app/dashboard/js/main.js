@@ -1,11 +1,19 @@
 /** Start of the page: the service's facts, the tabs, the keyboard, the key dialog. */
 
+import { keepAddress, read } from "./address.js";
+import { resume, running } from "./allocation.js";
 import { hasKey, json, onKeyNeeded, send, useKey } from "./api.js";
+import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
+import { redo, undo } from "./history.js";
+import { keepMission, restore } from "./keep.js";
 import { DispatchMap } from "./map.js";
-import { open, redo, undo } from "./problem.js";
+import { open } from "./problem.js";
+import { openPlan } from "./recent.js";
 import { allViews } from "./registry.js";
+import { fieldsOf } from "./schema.js";
 import { get, set, subscribe } from "./state.js";
+import { allocateNow } from "./views/allocate.js";
 import "./views/index.js";
 
 const FIRST_EXAMPLE = "cyclone-idai";
@@ -37,7 +45,6 @@ function show(id) {
   byId("page").hidden = !paged;
   set({ view: view.id });
   layOutDock();
-  if (!paged) map.resized();
   view.show?.();
 }
 
@@ -53,10 +60,7 @@ function mount(view) {
 /** The region below the map is there where the view has something in it. */
 function layOutDock() {
   const filled = [...byId("dock").children].some((each) => !each.hidden && each.childElementCount);
-  if (byId("dock").hidden === filled) {
-    byId("dock").hidden = !filled;
-    map.resized();
-  }
+  byId("dock").hidden = !filled;
 }
 
 function makeTabs() {
@@ -122,14 +126,20 @@ function onKeys(event) {
     (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
     set({ view: "allocate" });
-    byId("allocate-form")?.requestSubmit();
+    allocateNow();
   } else if (event.key === "Escape" && !typing) {
     map.stopPlacing();
     set({ selection: null });
   }
 }
 
+let looking = null;
+
+/** Say whether the service is there, again and again while the page is seen. */
 async function watchService() {
+  clearTimeout(looking);
+  looking = null;
+  if (document.hidden) return;
   const tell = (state, text) => {
     const shown = byId("service");
     shown.className = `service ${state}`;
@@ -142,7 +152,8 @@ async function watchService() {
     tell("down", error.status ? "Not ready" : "Not reachable");
   }
   if (missing) await load();
-  setTimeout(watchService, LOOK_AGAIN_MS);
+  clearTimeout(looking);
+  looking = setTimeout(watchService, LOOK_AGAIN_MS);
 }
 
 function titleProblem({ problem, problemName }) {
@@ -153,6 +164,7 @@ function titleProblem({ problem, problemName }) {
 /** Learn what the service offers, and open an example where nothing was made yet. */
 async function load() {
   try {
+    if (!get().fields) set({ fields: fieldsOf(await json("openapi.json")) });
     const { algorithms } = await json("algorithms");
     missing = false;
     set({ algorithms });
@@ -166,18 +178,42 @@ async function load() {
   }
 }
 
+/** Bring back what this tab showed last; a job that was under way is followed on. */
+async function comeBack() {
+  const kept = await restore((why) => notify(`This browser keeps nothing (${why}): export what you need before you leave.`, "error"));
+  keepMission();
+  if (!kept) return;
+  set(kept);
+  if (running(kept.job)) kept.job.id ? void resume(kept.job.id, kept.problem, kept.job.algorithm) : set({ job: null });
+}
+
+async function openFromAddress(job) {
+  try {
+    await openPlan(job);
+  } catch (error) {
+    notify(error.message, "error");
+  }
+}
+
 async function start() {
+  const asked = read(location.hash);
   makeKeyDialog();
   document.addEventListener("keydown", onKeys);
   subscribe(["problem", "problemName"], titleProblem);
-  set({ settings: await json("dashboard/settings.json") });
+  keepColours();
+  set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();
-  subscribe(["view"], ({ view }) => show(view));
+  if (asked) set({ view: asked.view });
+  await comeBack();
   await load();
   if (!get().problem) open({}, "New problem");
-  watchService();
+  subscribe(["view"], ({ view }) => show(view));
+  document.addEventListener("visibilitychange", watchService);
+  void watchService();
   show(get().view);
+  keepAddress((job) => void openFromAddress(job));
+  if (asked?.job && asked.job !== get().answer?.job_id) await openFromAddress(asked.job);
   document.documentElement.dataset.ready = "true";
 }
 

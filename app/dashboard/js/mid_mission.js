@@ -3,6 +3,9 @@
  * what is still carried and needed), and what a new plan changes against the old one. No page, no requests.
  */
 
+import { sum } from "./plan.js";
+import { requestedBy } from "./problem.js";
+
 const EARTH_RADIUS_KM = 6371.0088;
 const radians = (degrees) => (degrees * Math.PI) / 180;
 const degrees = (angle) => (angle * 180) / Math.PI;
@@ -138,16 +141,27 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
       ...uav, id: uavId(uav, i), x_c: now.place[0], y_c: now.place[1], dis: now.flown, ret, loadlist: load,
     });
   });
-  const targets = problem.targets.map((target, j) => ({
-    ...target,
-    id: targetId(target, j),
-    loadlist: needs.get(targetId(target, j)),
-    ...(target.deadline == null ? {} : { deadline: target.deadline - time }),
-  }));
+  const targets = problem.targets.map((target, j) => {
+    const id = targetId(target, j);
+    const loadlist = needs.get(id);
+    const served = target.requested || loadlist.some((need, k) => need !== target.loadlist[k]);
+    return {
+      ...target, id, loadlist,
+      // What an area asked for at first stays the measure of what it has.
+      ...(served ? { requested: requestedBy(target) } : {}),
+      ...(target.deadline == null ? {} : { deadline: target.deadline - time }),
+    };
+  });
   return {
     ...problem, uavs, targets,
     objective: { ...problem.objective, distance_weight: answer.distance_weight },
   };
+}
+
+/** An area with other needs than were left: it asked for as much more or less at first. */
+export function withNeeds(target, loadlist) {
+  if (!target.requested) return { ...target, loadlist };
+  return { ...target, loadlist, requested: loadlist.map((need, k) => Math.max(need, target.requested[k] + need - target.loadlist[k])) };
 }
 
 /** What is left of a plan after a moment, times counted from there; UAVs that are lost do nothing more,
@@ -188,25 +202,29 @@ export function changes(now, before, answer) {
     for (const route of list)
       for (const stop of route.stops)
         stop.delivered.forEach((amount, k) => {
-          const sum = sums.get(stop.target_id) ?? [];
-          sum[k] = (sum[k] ?? 0) + amount;
-          sums.set(stop.target_id, sum);
+          const all = sums.get(stop.target_id) ?? [];
+          all[k] = (all[k] ?? 0) + amount;
+          sums.set(stop.target_id, all);
         });
     return sums;
   };
   const old = given(before);
   const fresh = given(answer.routes);
+  // What is brought, as a share of what was asked for at first; and with what was there before.
+  const gain = (target, amounts) => {
+    const requested = sum(requestedBy(target));
+    return requested > 0 ? target.loadlist.reduce((got, most, k) => got + Math.min(most, amounts?.[k] ?? 0), 0) / requested : 0;
+  };
   const share = (target, amounts) => {
-    const need = target.loadlist.reduce((a, b) => a + b, 0);
-    const got = target.loadlist.reduce((sum, most, k) => sum + Math.min(most, amounts?.[k] ?? 0), 0);
-    return need > 0 ? got / need : null;
+    const requested = sum(requestedBy(target));
+    return requested > 0 ? 1 - sum(target.loadlist) / requested + gain(target, amounts) : null;
   };
   const areas = now.targets.map((target, j) => ({
     target_id: targetId(target, j),
     before: share(target, old.get(targetId(target, j))),
     after: share(target, fresh.get(targetId(target, j))),
   }));
-  const satisfaction = now.targets.reduce((sum, target, j) => sum + target.level * (areas[j].before ?? 0), 0);
+  const satisfaction = now.targets.reduce((total, target, j) => total + target.level * gain(target, old.get(targetId(target, j))), 0);
   const flown = before.reduce((sum, route) => sum + route.distance, 0);
   return { routes, areas, kept: { satisfaction, distance: flown, reward: satisfaction - answer.distance_weight * flown } };
 }

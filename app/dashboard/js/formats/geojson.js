@@ -34,7 +34,8 @@ export function fromGeoJson(collection, present, fields) {
   if (!Array.isArray(features)) throw new FormatError("it has no list `features`");
   const { uavs: _u, targets: _t, ...held } = present;
   const problem = { ...(settings ?? { ...held, crs: "wgs84" }), uavs: [], targets: [] };
-  if (problem.crs === "wgs84") onGlobe(collection.crs);
+  // Of a file of this page the service judges the positions.
+  if (!settings) onGlobe(collection.crs);
   const notices = [];
   const foreign = new Set();
   features.forEach((feature, at) => {
@@ -50,7 +51,7 @@ export function fromGeoJson(collection, present, fields) {
       else foreign.add(field);
     }
     const [x, y] = placeOf(feature.geometry, name, notices);
-    if (problem.crs === "wgs84" && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
+    if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
     const id = feature.id ?? properties.id;
     if (id !== undefined && id !== null) item.id = String(id);
     problem[kind].push(placed(kind, item, x, y));

@@ -1,32 +1,29 @@
 /** Allocate: algorithm, parameters and limits as the service describes them; the reward climbing live. */
 
 import { allocate, cancel, running } from "../allocation.js";
-import { json } from "../api.js";
 import { drawCurves } from "../curve.js";
-import { h, notify, number, shown } from "../dom.js";
+import { h, number, shown } from "../dom.js";
+import { wayTo } from "../faults.js";
 import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
-import { get, set, select, subscribe } from "../state.js";
+import { get, set, subscribe } from "../state.js";
 
 const PREFERRED = ["auto", "transfer_qmix"];
-const PROBLEM_FIELDS = new Set(["uavs", "targets", "max_steps", "crs", "objective"]);
 const OWN_FIELDS = new Set(["algorithm", "parameters"]);
-const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
 const FIRST_LIMIT_S = 5;
 const REDRAW_MS = 150;
 const SAY_EVERY_MS = 6000;
 
 /** The form; returns it with a function that reads it. */
-function makeForm(schemas) {
-  const { algorithms } = get();
+function makeForm() {
+  const { algorithms, fields } = get();
   const names = algorithms.map(({ name }) => name);
   const first = PREFERRED.find((name) => names.includes(name)) ?? names[0];
   const choice = h("select", { name: "algorithm", onchange: () => choose() }, names.map((name) => h("option", { value: name, selected: name === first }, name)));
   const summary = h("p", { class: "hint" });
   const place = h("div", {});
-  const request = schemas.AllocationRequest.properties;
-  const rest = Object.fromEntries(Object.entries(request).filter(([name]) => !PROBLEM_FIELDS.has(name) && !OWN_FIELDS.has(name)));
-  const limits = new Fields(rest, { pointer: "", defs: schemas, values: { time_limit_s: FIRST_LIMIT_S } });
+  const rest = Object.fromEntries(Object.entries(fields.request).filter(([name]) => !OWN_FIELDS.has(name)));
+  const limits = new Fields(rest, { pointer: "", values: { time_limit_s: FIRST_LIMIT_S } });
   let parameters;
   const choose = () => {
     const algorithm = algorithms.find(({ name }) => name === choice.value);
@@ -57,26 +54,13 @@ function makeForm(schemas) {
     const { violations } = get();
     const others = showViolations(form, violations);
     if (violations.some(({ pointer }) => pointer.startsWith("/parameters"))) form.querySelector("details").open = true;
-    elsewhere.replaceChildren(...others.map(violation));
+    elsewhere.replaceChildren(...others.map(({ pointer, detail }) => h("li", { class: "error" }, wayTo(pointer, get().problem), ` ${detail}`)));
     form.querySelector("[aria-invalid]")?.focus();
   };
   subscribe(["job"], enable);
   subscribe(["violations"], refuse);
   enable();
   return form;
-}
-
-/** A refusal of the problem itself, with the way to its field. */
-function violation({ pointer, detail }) {
-  const [, kind, at, field] = pointer.split("/");
-  const item = get().problem[kind]?.[Number(at)];
-  const go = () => {
-    if (item?.id) select({ kind, id: item.id });
-    set({ view: "problem" });
-    document.querySelector(`table[data-kind="${kind}"] tr[data-id="${CSS.escape(item?.id ?? "")}"] td[data-column^="${field}"]`)?.focus();
-  };
-  const where = item?.id ? [item.id, field].filter(Boolean).join(", ") : (PARTS[pointer] ?? pointer);
-  return h("li", { class: "error" }, h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where), ` ${detail}`);
 }
 
 /** How far the job is. */
@@ -123,7 +107,7 @@ function makeChart(dock) {
     if (!job || (job.status === "failed" && !job.trace.length)) return dock.replaceChildren();
     if (!dock.childElementCount) dock.append(chart);
     const points = job.trace.filter(({ reward }) => reward !== null).map(({ t, reward }) => [t, reward]);
-    drawCurves(chart, [{ name: job.algorithm, points }], { x: "seconds", height: 170, label: `Reward against time, now ${job.best_reward}` });
+    drawCurves(chart, [{ name: job.algorithm ?? "", points }], { x: "seconds", height: 170, label: `Reward against time, now ${job.best_reward}` });
   };
   const later = () => { waiting ??= setTimeout(draw, REDRAW_MS); };
   subscribe(["job"], later);
@@ -131,6 +115,14 @@ function makeChart(dock) {
 }
 
 let redraw = () => {};
+let form = null;
+let wanted = false; // to allocate as soon as there is a form
+
+/** Allocate with what the form says. */
+export function allocateNow() {
+  if (form) form.requestSubmit();
+  else wanted = true;
+}
 
 registerView({
   id: "allocate", title: "Allocate", order: 20, layout: "panel",
@@ -138,18 +130,20 @@ registerView({
     redraw = makeChart(dock);
     const waiting = h("p", { class: "hint" }, "The service has not said yet what it offers.");
     root.append(waiting);
-    const fill = async () => {
+    const fill = () => {
       if (!get().algorithms.length || !waiting.isConnected) return;
-      const { components } = await json("openapi.json");
-      waiting.replaceWith(makeForm(components.schemas), makeProgress());
+      form = makeForm();
+      waiting.replaceWith(form, makeProgress());
+      if (wanted) form.requestSubmit();
+      wanted = false;
     };
-    const tryToFill = () => fill().catch((error) => notify(error.message, "error"));
-    subscribe(["algorithms"], tryToFill);
-    tryToFill();
+    subscribe(["algorithms"], fill);
+    fill();
   },
   show: () => redraw(),
 });
 
-subscribe(["answer"], ({ answer, view }) => {
-  if (answer && view === "allocate") set({ view: "answer" });
+// A plan that was found, not one that comes back with its problem.
+subscribe(["answer"], ({ answer, view }, changed) => {
+  if (answer && view === "allocate" && !changed.includes("problem")) set({ view: "answer" });
 });

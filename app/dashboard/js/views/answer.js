@@ -1,8 +1,11 @@
 /** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
 
+import { paint } from "../colours.js";
 import { amounts, h, number, shown } from "../dom.js";
-import { hue, sum } from "../plan.js";
+import { sum } from "../plan.js";
+import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
 import { Portions } from "../portions.js";
+import { requestedBy } from "../problem.js";
 import { registerView } from "../registry.js";
 import { get, select, set, subscribe } from "../state.js";
 import { timeline } from "../timeline.js";
@@ -32,22 +35,19 @@ function boundFigures({ bound, gap }) {
 
 function source(answer) {
   const policy = answer.source_policy;
-  const how = `${answer.algorithm}, seed ${answer.seed}`;
+  const how = [`${answer.algorithm}, seed ${answer.seed} `, answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
-  return h("p", { class: "hint", id: "source" }, `${how}. Policy `, h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
+  return h("p", { class: "hint", id: "source" }, how, ". Policy ", h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
 }
 
-function routeRows(problem) {
-  const indices = new Map(problem.uavs.map((uav, index) => [uav.id, index]));
-  return (route) =>
-    route.stops.map((stop, n) => {
-      const key = h("span", { class: "key", "aria-hidden": "true" });
-      key.style.setProperty("--hue", hue(indices.get(route.uav_id)));
-      const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
-      return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
-        h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
-        h("td", { class: "num" }, amounts(stop.delivered)));
-    });
+function routeRows(route) {
+  return route.stops.map((stop, n) => {
+    const key = paint(h("span", { class: "key", "aria-hidden": "true" }), route.uav_id);
+    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
+    return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
+      h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
+      h("td", { class: "num" }, amounts(stop.delivered)));
+  });
 }
 
 function routesTable(problem, answer) {
@@ -55,14 +55,14 @@ function routesTable(problem, answer) {
   const out = answer.routes.filter((route) => route.stops.length);
   if (!out.length) return h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance.");
   const body = h("tbody", {});
-  long.routes = new Portions(body, out, routeRows(problem), (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
+  long.routes = new Portions(body, out, routeRows, (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
   return h("details", { open: true }, h("summary", {}, `Routes of ${out.length} of ${problem.uavs.length} UAVs`),
     h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [1, 3, 4].includes(at) ? "num" : null }, title)))), body)));
 }
 
 function unmetList(problem, answer) {
   const title = answer.unmet.length ? `Unmet needs of ${answer.unmet.length} of ${problem.targets.length} areas` : `All ${problem.targets.length} areas get all they need`;
-  const needs = new Map(problem.targets.map((target) => [target.id, sum(target.loadlist)]));
+  const needs = new Map(problem.targets.map((target) => [target.id, sum(requestedBy(target))]));
   const item = (unmet) =>
     h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
       h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "targets", id: unmet.target_id }) }, unmet.target_id), unmet.code && h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
@@ -76,8 +76,7 @@ function unmetList(problem, answer) {
 registerView({
   id: "answer", title: "Answer", order: 30, layout: "panel",
   mount(root, { dock }) {
-    const stale = h("p", { class: "warning", id: "stale" }, "The problem was changed after this answer.");
-    const markStale = () => { stale.hidden = !get().answer || get().answerProblem === get().problem; };
+    const stale = staleNote("stale", "The problem was changed after this answer.");
     const draw = () => {
       const { answer, answerProblem } = get();
       if (!answer) {
@@ -85,7 +84,7 @@ registerView({
         return dock.replaceChildren();
       }
       Object.assign(long, { routes: null, unmet: null, timeline: null });
-      root.replaceChildren(stale, figures(answer), source(answer), routesTable(answerProblem, answer), unmetList(answerProblem, answer));
+      root.replaceChildren(stale, figures(answer), source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), routesTable(answerProblem, answer), unmetList(answerProblem, answer));
       const { element, portions } = timeline(answerProblem, answer);
       long.timeline = portions;
       dock.replaceChildren(...(element ? [element] : []));
@@ -104,12 +103,19 @@ registerView({
         const chosen = selection?.kind === "uavs" ? row.dataset.uavId === selection.id : selection !== null && row.dataset.targetId === selection.id;
         row.classList.toggle("chosen", chosen);
       }
-      root.querySelector("#routes tr.chosen")?.scrollIntoView({ block: "nearest" });
+      if (!clicked) root.querySelector("#routes tr.chosen")?.scrollIntoView({ block: "nearest" });
+    };
+    /** Do it, and keep what was clicked in the panel under the pointer. */
+    let clicked = null;
+    const held = (act) => {
+      const was = clicked?.getBoundingClientRect().top;
+      act();
+      if (clicked?.isConnected) root.closest(".panel").scrollTop += clicked.getBoundingClientRect().top - was;
     };
     subscribe(["answer"], draw);
-    subscribe(["problem", "answerProblem"], markStale);
-    subscribe(["selection"], markSelection);
+    subscribe(["selection"], () => held(markSelection));
+    root.addEventListener("click", ({ target }) => { clicked = target.closest("button"); }, { capture: true });
+    root.addEventListener("click", () => { clicked = null; });
     draw();
-    markStale();
   },
 });

@@ -2,9 +2,11 @@
 
 import { drawCurves } from "../curve.js";
 import { h, notify, number, shown } from "../dom.js";
+import { showPlan } from "../history.js";
+import { answeredBy } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { allocate } from "../running.js";
-import { get, set, subscribe } from "../state.js";
+import { get, subscribe } from "../state.js";
 import { taskPicture } from "../task_picture.js";
 
 const PREFERRED = ["auto", "transfer_qmix", "local_search", "ga", "greedy"];
@@ -141,7 +143,7 @@ function row({ algorithm, answer, error }, best, bounded) {
     return h("tr", {}, h("th", { scope: "row" }, algorithm), h("td", { colspan: "7", class: error ? "error" : "muted" }, why));
   }
   return h("tr", { class: answer.reward === best ? "best" : null, "data-algorithm": algorithm },
-    h("th", { scope: "row" }, algorithm),
+    h("th", { scope: "row" }, algorithm, " ", answeredBy(answer)),
     h("td", { class: "n" }, number(answer.reward, 5)),
     h("td", { class: "n" }, best > 0 ? `${((100 * answer.reward) / best).toFixed(1)} %` : "–"),
     h("td", { class: "n" }, number(answer.satisfaction, 5)),
@@ -160,7 +162,7 @@ function card({ algorithm, answer }) {
     taskPicture(problem, { answer, label, width: 320, height: 220 }),
     h("p", {}, "Reward ", number(answer.reward), `, ${flying} of ${answer.routes.length} UAVs, ${answer.unmet.length} areas unmet`),
     h("button", { type: "button", class: "quiet", onclick: () => {
-      set({ problem, answer, answerProblem: problem, incumbent: null });
+      showPlan(problem, answer, { problem });
       notify(`The plan of ${algorithm} is the one on the map now.`);
     } }, "Take this plan"));
 }

@@ -2,12 +2,14 @@
 
 import { ApiError } from "../api.js";
 import { h, notify, number, shortAmounts, shown } from "../dom.js";
-import { changes, missionEnd, moments, problemAt, remainder, uavAt } from "../mid_mission.js";
+import { showPlan, undo } from "../history.js";
+import { changes, missionEnd, moments, problemAt, remainder, uavAt, withNeeds } from "../mid_mission.js";
 import { sum } from "../plan.js";
+import { answeredBy } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { registerView } from "../registry.js";
 import { allocate } from "../running.js";
-import { get, set, subscribe } from "../state.js";
+import { BEGINNING, get, set, subscribe } from "../state.js";
 
 const FRAMES = 240; // the whole mission in about 12 s
 const FRAME_MS = 50;
@@ -16,17 +18,11 @@ const FEW_KINDS = 8;
 
 let parts = null;
 let map = null;
-let clock = 0;
-let lost = new Set();
-let happened = new Map(); // area id → {level, loadlist} as it is now
-let found = []; // new areas
-let outcome = null; // {now, difference, answer}
 let ticking = null;
 const unfolded = new Set(); // areas of many kinds whose needs are to be seen
 let shownUavs = 0; // rows that were asked for
 let shownAreas = 0;
 let stopping = null;
-let known = null; // the answer that all of the above is about
 
 registerView({ id: "field", title: "In the field", order: 50, layout: "panel", mount, show, hide });
 
@@ -44,7 +40,7 @@ function mount(root, context) {
     before: h("button", { type: "button", onclick: () => step(-1) }, "Event before"),
     uavs: h("div", { class: "scroll" }),
     areas: h("div", { class: "scroll" }),
-    recall: h("input", { type: "checkbox", name: "recall", onchange: draw }),
+    recall: h("input", { type: "checkbox", name: "recall", onchange: () => note({ recall: parts.recall.checked }) }),
     algorithm: h("select", { name: "algorithm" }),
     limit: h("input", { type: "number", min: "0.05", step: "any", value: "2", name: "time_limit_s" }),
     start: h("button", { type: "submit", class: "primary" }, "Allocate again from here"),
@@ -69,7 +65,10 @@ function mount(root, context) {
       h("p", { class: "actions" }, parts.start, " ", parts.stop),
       parts.status));
   root.append(h("h2", {}, "In the field"), parts.empty, parts.body);
-  subscribe(["answer", "answerProblem"], () => { if (get().view === "field") begin(); });
+  subscribe(["answer", "answerProblem", "mission"], (_, changed) => {
+    if (changed.includes("answer")) halt();
+    if (get().view === "field") begin();
+  });
   subscribe(["algorithms"], algorithms);
   algorithms();
 }
@@ -90,36 +89,36 @@ function hide() {
   map.showPlan(null);
 }
 
-/** Take the answer on screen as the mission, from its beginning. */
+/** Show the mission of the plan on screen, if there is one. */
 function begin() {
   const { answer } = get();
-  if (answer !== known) {
-    halt();
-    known = answer;
-    clock = 0;
-    lost = new Set();
-    happened = new Map();
-    found = [];
-  }
   parts.empty.hidden = Boolean(answer);
   parts.body.hidden = !answer;
   if (answer) draw();
-  else parts.dock.replaceChildren();
+  else {
+    map.showPlan(null);
+    parts.dock.replaceChildren();
+  }
 }
 
-function mission() {
+function plan() {
   const { answer, answerProblem } = get();
   return { answer, problem: answerProblem };
 }
 
+/** Take down what has happened in the mission until now. */
+function note(patch) {
+  set({ mission: { ...get().mission, ...patch } });
+}
+
 function moveTo(time) {
-  const { answer, problem } = mission();
-  clock = Math.min(Math.max(0, time || 0), missionEnd(problem, answer));
-  draw();
+  const { answer, problem } = plan();
+  note({ clock: Math.min(Math.max(0, time || 0), missionEnd(problem, answer)) });
 }
 
 function step(way) {
-  const { answer, problem } = mission();
+  const { answer, problem } = plan();
+  const { clock } = get().mission;
   const all = moments(problem, answer);
   const next = way > 0 ? all.find((at) => at > clock + 1e-9) : all.findLast((at) => at < clock - 1e-9);
   if (next !== undefined) moveTo(next);
@@ -128,15 +127,15 @@ function step(way) {
 function toggle() {
   if (ticking) halt();
   else {
-    const { answer, problem } = mission();
+    const { answer, problem } = plan();
     const end = missionEnd(problem, answer);
-    if (clock >= end) clock = 0;
+    if (get().mission.clock >= end) note({ clock: 0 });
     parts.run.textContent = "Halt";
     const tick = () => {
       const began = performance.now();
-      moveTo(clock + (end / FRAMES) * Math.min(MOST_FRAMES, Math.max(1, took / FRAME_MS)));
+      moveTo(get().mission.clock + (end / FRAMES) * Math.min(MOST_FRAMES, Math.max(1, took / FRAME_MS)));
       took = performance.now() - began;
-      if (clock >= end) halt();
+      if (get().mission.clock >= end) halt();
       else ticking = setTimeout(tick, Math.max(FRAME_MS - took, took));
     };
     let took = 0;
@@ -152,14 +151,21 @@ function halt() {
 
 /** The problem at the moment, with what has happened. */
 function present() {
-  const { answer, problem } = mission();
-  const at = problemAt(problem, answer, clock, { lost, recall: parts.recall.checked });
-  return { ...at, targets: [...at.targets.map((target) => ({ ...target, ...happened.get(target.id) })), ...found] };
+  const { answer, problem } = plan();
+  const { clock, lost, happened, found, recall } = get().mission;
+  const at = problemAt(problem, answer, clock, { lost: new Set(lost), recall });
+  const told = (target) => {
+    const { loadlist = target.loadlist, ...fields } = happened[target.id] ?? {};
+    return { ...(loadlist === target.loadlist ? target : withNeeds(target, loadlist)), ...fields };
+  };
+  return { ...at, targets: [...at.targets.map(told), ...found] };
 }
 
 function draw() {
-  const { answer, problem } = mission();
+  const { answer, problem } = plan();
+  const { clock, recall } = get().mission;
   const end = missionEnd(problem, answer);
+  parts.recall.checked = recall;
   parts.time.max = String(end);
   parts.time.value = String(clock);
   parts.exact.max = String(end);
@@ -173,8 +179,9 @@ function draw() {
 }
 
 function drawMap(now) {
-  const { answer, problem } = mission();
-  const rest = remainder(problem, answer, clock, lost);
+  const { answer, problem } = plan();
+  const { clock, lost } = get().mission;
+  const rest = remainder(problem, answer, clock, new Set(lost));
   const coming = new Map();
   for (const { stops } of rest)
     for (const { target_id: id, delivered } of stops)
@@ -186,7 +193,8 @@ function drawMap(now) {
 }
 
 function drawUavs(now) {
-  const { answer, problem } = mission();
+  const { answer, problem } = plan();
+  const { clock, lost } = get().mission;
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
   const body = h("tbody", {});
   parts.uavs.replaceChildren(
@@ -196,7 +204,7 @@ function drawUavs(now) {
   const rows = new Portions(body, problem.uavs, (uav, i) => {
         const is = uavAt(problem, answer, i, clock);
         const doing = { flying: `to ${is.next}`, unloading: `at ${is.next}` }[is.doing] ?? is.doing;
-        const gone = lost.has(uav.id);
+        const gone = lost.includes(uav.id);
         return h("tr", { class: gone ? "lost" : null, "data-uav": uav.id },
           h("th", { scope: "row" }, uav.id),
           h("td", {}, gone ? "lost" : doing),
@@ -204,7 +212,10 @@ function drawUavs(now) {
           h("td", { class: "n load" }, gone ? "–" : shortAmounts(left.get(uav.id).loadlist, " · ")),
           h("td", {}, h("input", {
             type: "checkbox", "aria-label": `${uav.id} is lost`, checked: gone,
-            onchange: (event) => { lost = new Set(lost); lost[event.target.checked ? "add" : "delete"](uav.id); draw(); },
+            onchange: (event) => {
+              const others = get().mission.lost.filter((id) => id !== uav.id);
+              note({ lost: event.target.checked ? [...others, uav.id] : others });
+            },
           })));
       }, (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
   rows.upTo(Math.min(shownUavs, problem.uavs.length));
@@ -212,6 +223,7 @@ function drawUavs(now) {
 }
 
 function drawAreas(now) {
+  const { happened, found } = get().mission;
   const fresh = new Set(found.map(({ id }) => id));
   const body = h("tbody", {});
   parts.areas.replaceChildren(
@@ -219,22 +231,28 @@ function drawAreas(now) {
       h("thead", {}, h("tr", {}, ["Area", "Level", "Still needed"].map((title) => h("th", { scope: "col" }, title)), h("th", { scope: "col" }, h("span", { class: "visually-hidden" }, "Undo")))),
       body));
   const rows = new Portions(body, [...now.targets].sort((a, b) => fresh.has(b.id) - fresh.has(a.id)), (target) =>
-        h("tr", { class: fresh.has(target.id) ? "new" : happened.has(target.id) ? "changed" : null, "data-area": target.id },
+        h("tr", { class: fresh.has(target.id) ? "new" : target.id in happened ? "changed" : null, "data-area": target.id },
           h("th", { scope: "row" }, target.id,
             fresh.has(target.id) && h("span", { class: "place" }, field(target, "x", "x"), field(target, "y", "y"))),
           h("td", {}, field(target, "level", "level")),
           h("td", {}, needFields(target)),
           h("td", {}, fresh.has(target.id)
-            ? h("button", { type: "button", class: "quiet", onclick: () => { found = found.filter(({ id }) => id !== target.id); redraw(); } }, "Remove")
-            : happened.has(target.id) && h("button", { type: "button", class: "quiet", onclick: () => { happened.delete(target.id); redraw(); } }, "Undo"))),
+            ? h("button", { type: "button", class: "quiet", onclick: () => noteArea({ found: get().mission.found.filter(({ id }) => id !== target.id) }) }, "Remove")
+            : target.id in happened && h("button", { type: "button", class: "quiet", onclick: () => noteArea({ happened: without(get().mission.happened, target.id) }) }, "Undo"))),
     (button) => h("tr", {}, h("td", { colspan: "4" }, button)));
   rows.upTo(Math.min(shownAreas, now.targets.length));
   body.addEventListener("click", () => { shownAreas = Math.max(shownAreas, rows.count); });
 }
 
-function redraw() {
+/** Take something down of the areas, whose rows are then made anew. */
+function noteArea(patch) {
   document.activeElement?.blur?.();
-  draw();
+  note(patch);
+}
+
+function without(record, id) {
+  const { [id]: _, ...rest } = record;
+  return rest;
 }
 
 function field(target, name, what) {
@@ -246,7 +264,8 @@ function field(target, name, what) {
 
 /** A field for each kind needed; of many kinds folded up. */
 function needFields(target) {
-  const fields = h("div", { class: "amounts" }, target.loadlist.map((amount, k) => amountField(target, amount, k)));
+  const of = (k) => target.requested && h("span", { class: "hint" }, ` of ${shown(target.requested[k])}`);
+  const fields = h("div", { class: "amounts" }, target.loadlist.map((amount, k) => [amountField(target, amount, k), of(k)]).flat());
   if (target.loadlist.length <= FEW_KINDS) return fields;
   const open = unfolded.has(target.id);
   return h("details", { open, ontoggle: (event) => unfolded[event.target.open ? "add" : "delete"](target.id) },
@@ -265,9 +284,9 @@ function amountField(target, amount, k) {
 }
 
 function changed(target, fields) {
-  if (found.some(({ id }) => id === target.id)) found = found.map((each) => (each.id === target.id ? { ...each, ...fields } : each));
-  else happened.set(target.id, { ...happened.get(target.id), ...fields });
-  redraw();
+  const { found, happened } = get().mission;
+  if (found.some(({ id }) => id === target.id)) noteArea({ found: found.map((each) => (each.id === target.id ? { ...each, ...fields } : each)) });
+  else noteArea({ happened: { ...happened, [target.id]: { ...happened[target.id], ...fields } } });
 }
 
 /** A new area in the middle of the others; its place, level and needs are to be filled in. */
@@ -277,20 +296,22 @@ function discover() {
   let n = targets.length + 1;
   while (targets.some(({ id }) => id === `area-${n}`)) n += 1;
   const level = Math.max(...targets.map((target) => target.level));
-  const loadlist = targets[0].loadlist.map((_, k) => Math.max(...mission().problem.targets.map((target) => target.loadlist[k])));
-  found = [...found, { id: `area-${n}`, x: Number(middle("x").toFixed(6)), y: Number(middle("y").toFixed(6)), level, loadlist }];
-  redraw();
+  const loadlist = targets[0].loadlist.map((_, k) => Math.max(...plan().problem.targets.map((target) => target.loadlist[k])));
+  const area = { id: `area-${n}`, x: Number(middle("x").toFixed(6)), y: Number(middle("y").toFixed(6)), level, loadlist };
+  noteArea({ found: [...get().mission.found, area] });
 }
 
 async function again() {
   halt();
-  const { answer, problem } = mission();
+  const { answer, problem } = plan();
   const now = present();
   if (!now.uavs.length) {
     notify("Every UAV is lost: nobody is left to fly.", "error");
     return;
   }
-  const rest = remainder(problem, answer, clock, lost);
+  const { clock, lost } = get().mission;
+  const { opened } = get();
+  const rest = remainder(problem, answer, clock, new Set(lost));
   stopping = new AbortController();
   parts.start.disabled = true;
   parts.stop.disabled = false;
@@ -304,17 +325,12 @@ async function again() {
           if (reward !== null && reward !== undefined) parts.status.textContent = `Best so far: reward ${shown(reward)}.`;
         },
       });
-    if (given) {
-      outcome = { answer: given, difference: changes(now, rest, given), at: clock };
-      known = given;
-      const { past } = get();
+    if (given && get().opened !== opened) notify("The plan of the mission before is ready: it is among the recent plans");
+    else if (given) {
       parts.status.textContent = `A new plan from ${shown(clock)} on: reward ${shown(given.reward)}. Undo goes back to the mission before.`;
-      clock = 0;
-      lost = new Set();
-      happened = new Map();
-      found = [];
-      set({ problem: now, past: [...past, get().problem], future: [], answer: given, answerProblem: now, incumbent: null, selection: null });
-      begin();
+      parts.status.append(...[answeredBy(given)].filter(Boolean));
+      notify("A new plan is on screen", "info", { title: "Undo", act: undo });
+      showPlan(now, given, { problem: now, mission: { ...BEGINNING, outcome: changes(now, rest, given) }, selection: null });
     } else parts.status.textContent = "Stopped before there was a plan.";
   } catch (error) {
     if (error instanceof ApiError) set({ violations: error.violations });
@@ -328,11 +344,11 @@ async function again() {
 
 /** What the newest plan changed, as long as it is the mission on screen. */
 function drawOutcome() {
-  if (!outcome || outcome.answer !== get().answer) {
+  const { answer, mission: { outcome: difference } } = get();
+  if (!difference) {
     parts.dock.replaceChildren();
     return;
   }
-  const { difference, answer } = outcome;
   const list = (ids) => (ids.length ? ids.join(" → ") : "home");
   const percent = (share) => (share === null ? "–" : `${Math.round(100 * share)} %`);
   const gained = answer.reward - difference.kept.reward;

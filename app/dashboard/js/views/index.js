@@ -7,3 +7,4 @@ import "./compare.js";
 import "./field.js";
 import "./library.js";
 import "./take_away.js";
+import "./recent.js";

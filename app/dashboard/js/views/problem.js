@@ -5,27 +5,38 @@ import { download, h, notify, shown } from "../dom.js";
 import { Fields, labelled } from "../fields.js";
 import { read, toCsv, toGeoJson, toJson } from "../formats.js";
 import { Grid } from "../grid.js";
-import { edit, materials, open, redo, remove, setMaterials, undo, update } from "../problem.js";
+import { redo, undo } from "../history.js";
+import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
+import { isAmounts } from "../schema.js";
 import { get, select, subscribe } from "../state.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
-const OPTIONAL = new Set(["x_c", "y_c", "dis", "ret", "deadline", "service_time"]);
-const COLUMNS = {
-  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", speed: "speed", voyage: "range", dis: "flown", ret: "returning" },
-  targets: { id: "Area", x: "x", y: "y", level: "urgency", deadline: "deadline", service_time: "service time" },
+/** What people call the fields; those that are not here go by their own names. */
+const TITLES = {
+  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", speed: "speed", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
+  targets: { id: "Area", x: "x", y: "y", level: "urgency", deadline: "deadline", service_time: "service time", loadlist: "need", requested: "requested" },
 };
 const KINDS = { uavs: "UAVs", targets: "Areas" };
+const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
+const NOT_SAID = "The service has not said yet which fields a problem has";
 
+/** Columns of numbers, and of amounts one a material where an item has some. */
 function columnsOf(kind, problem) {
   const globe = problem.crs === "wgs84";
-  const told = (title) => (globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title);
-  const fields = Object.entries(COLUMNS[kind]).map(([name, title]) => ({ name, title: told(title), read: (item) => item[name] }));
-  const loads = Array.from({ length: materials(problem) }, (_, k) => ({
-    name: `loadlist/${k}`, title: `${kind === "uavs" ? "load" : "need"} ${k + 1}`, read: (item) => item.loadlist[k],
-  }));
-  return [...fields, ...loads];
+  const titled = (name) => {
+    const title = TITLES[kind][name] ?? name.replaceAll("_", " ");
+    return globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title;
+  };
+  const known = get().fields?.[kind] ?? {};
+  const plain = ([name, { type }]) => name === "id" || type === "number" || type === "integer";
+  const held = ([name, schema]) => isAmounts(schema) && problem[kind].some((item) => item[name]);
+  const scalars = Object.entries(known).filter(plain).map(([name]) => ({ name, title: titled(name), read: (item) => item[name] }));
+  const lists = Object.entries(known).filter(held).flatMap(([field]) => Array.from({ length: materials(problem) }, (_, k) => ({
+    name: `${field}/${k}`, title: `${titled(field)} ${k + 1}`, read: (item) => item[field]?.[k],
+  })));
+  return [...scalars, ...lists];
 }
 
 /** Take what was typed into a cell or field as the item's. */
@@ -35,10 +46,12 @@ function enter(kind, id, name, text) {
     if (!text || get().problem[kind].some((each) => each.id === text)) return notify(`Another id is needed than “${text}”`, "error");
     return update(kind, id, { id: text });
   }
-  const value = text === "" ? undefined : Number(text.replace("−", "-"));
-  if (Number.isNaN(value) || (value === undefined && !OPTIONAL.has(name))) return notify(`${name} of ${id} needs a number`, "error");
   const [field, k] = name.split("/");
-  update(kind, id, k === undefined ? { [name]: value } : { [field]: item.loadlist.with(Number(k), value) });
+  const value = text === "" ? undefined : Number(text.replace("−", "-"));
+  if (Number.isNaN(value) || (value === undefined && get().fields[kind][field].needed)) return notify(`${name} of ${id} needs a number`, "error");
+  if (k === undefined || value === undefined) return update(kind, id, { [field]: value });
+  // Amounts that were not set are those of the load until then.
+  update(kind, id, { [field]: (item[field] ?? item.loadlist).with(Number(k), value) });
 }
 
 function mountTables(dock) {
@@ -78,41 +91,62 @@ function mountTables(dock) {
     mark();
   };
   choose("targets");
-  subscribe(["problem"], draw);
+  subscribe(["problem", "fields"], draw);
   subscribe(["selection", "violations"], mark);
   draw();
 }
 
 async function fillExamples(root) {
   if (!get().algorithms.length || root.dataset.filled) return;
-  root.dataset.filled = "true";
   const { examples } = await json("examples");
+  if (root.dataset.filled) return;
+  root.dataset.filled = "true";
   root.prepend(
     ...examples.map(({ name, href }) =>
-      h("button", { type: "button", dataset: { example: name }, onclick: async () => open(await json(href), name) }, name),
+      h("button", { type: "button", dataset: { example: name }, onclick: () => said(async () => bring(await json(href), name)) }, name),
     ),
   );
 }
 
+/** Open a problem, and say how what was there comes back. */
+function bring(problem, name, told = `${name} is open`) {
+  const { past } = get();
+  open(problem, name);
+  const undoable = get().past !== past;
+  notify(told, "info", undoable ? { title: "Undo", act: undo } : null);
+}
+
 function mountExamples(root) {
-  root.append(h("button", { type: "button", onclick: () => open({ crs: get().problem.crs }, "New problem") }, "Empty"));
-  const fill = () => fillExamples(root).catch((error) => notify(error.message, "error"));
+  root.append(h("button", { type: "button", onclick: () => bring({ crs: get().problem.crs }, "New problem", "All is taken away") }, "Empty"));
+  const fill = () => said(() => fillExamples(root));
   subscribe(["algorithms"], fill);
   fill();
 }
 
 async function takeIn(file) {
+  await said(async () => {
+    if (!get().fields) throw new Error(NOT_SAID);
+    const { problem, notices } = read(new Uint8Array(await file.arrayBuffer()), get().problem, get().fields);
+    bring(problem, file.name.replace(/\.[^.]+$/, ""), [`${file.name} is open`, ...notices].join(". "));
+  }, `${file.name}: `);
+}
+
+/** Do something, and say what went wrong with it. */
+async function said(act, what = "") {
   try {
-    open(read(await file.text(), get().problem), file.name.replace(/\.[^.]+$/, ""));
-    notify(`${file.name} is open`);
+    await act();
   } catch (error) {
-    notify(`${file.name}: ${error.message}`, "error");
+    notify(what + error.message, "error");
   }
 }
 
 function filesCard() {
-  const input = h("input", { type: "file", id: "import", accept: ".json,.csv,.geojson", hidden: true, onchange: () => { takeIn(input.files[0]); input.value = ""; } });
-  const save = ([make, ending, type]) => download(`${get().problemName || "problem"}.${ending}`, make(get().problem), type);
+  const input = h("input", { type: "file", id: "import", accept: ".json,.csv,.tsv,.txt,.geojson", hidden: true, onchange: () => { void takeIn(input.files[0]); input.value = ""; } });
+  const save = ([make, ending, type]) => said(() => {
+    const { problem, problemName, fields } = get();
+    if (!fields) throw new Error(NOT_SAID);
+    download(`${problemName || "problem"}.${ending}`, make(problem, fields), type);
+  });
   return h("div", { class: "row" }, h("button", { type: "button", onclick: () => input.click() }, "Import…"), input,
     Object.entries(FILES).map(([title, file]) => h("button", { type: "button", dataset: { export: title }, onclick: () => save(file) }, title)));
 }
@@ -153,30 +187,35 @@ function mountInspector(root) {
     const facts = kind === "uavs" ? `${stateOf(item)}, range left ${shown(rangeLeft(item), 6)} of ${shown(item.voyage, 6)}` : "";
     root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), h("div", { class: "grid3" }, fields)));
   };
-  subscribe(["selection", "problem"], draw);
+  subscribe(["selection", "problem", "fields"], draw);
   draw();
 }
 
-/** Settings of the problem, the objective's from the service's own description. */
-async function mountSettings(root) {
-  const { components } = await json("openapi.json");
-  const objective = components.schemas.ObjectiveModel;
+/** Settings of the problem, from the service's own description. */
+function mountSettings(root) {
+  const numeric = (name, value, take) => h("input", { value: String(value), inputmode: "numeric", name, onchange: (event) => take(Number(event.target.value)) });
   const draw = () => {
-    const { problem } = get();
-    const steps = h("input", { value: String(problem.max_steps), inputmode: "numeric", name: "max_steps", onchange: () => edit(() => ({ max_steps: Number(steps.value) })) });
-    const kinds = h("input", { value: String(materials(problem)), inputmode: "numeric", name: "materials", onchange: () => (Number(kinds.value) >= 1 && Number(kinds.value) <= 64 ? setMaterials(Math.trunc(Number(kinds.value))) : draw()) });
-    const crs = h("select", { name: "crs", onchange: () => edit(() => ({ crs: crs.value })) }, [["local", "on a plane"], ["wgs84", "longitude, latitude"]].map(([value, title]) => h("option", { value, selected: value === problem.crs }, title)));
-    const fields = new Fields(objective.properties, { pointer: "/objective", values: problem.objective, defs: components.schemas, onchange: () => edit(() => ({ objective: { distance_weight: null, return_to_base: true, charge_return: false, ...fields.values() } })) });
-    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", crs, { pointer: "/crs" }), labelled("Decision steps", steps, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), fields.element);
+    const { problem, fields: { settings } } = get();
+    const { crs, max_steps: steps, ...others } = settings;
+    const most = numeric("max_steps", problem.max_steps ?? steps.default, (count) => (Number.isInteger(count) ? edit(() => ({ max_steps: count })) : draw()));
+    const kinds = numeric("materials", materials(problem), (count) => (count >= 1 && count <= 64 ? setMaterials(Math.trunc(count)) : draw()));
+    const where = h("select", { name: "crs", onchange: () => edit(() => ({ crs: where.value })) }, crs.enum.map((value) => h("option", { value, selected: value === (problem.crs ?? crs.default) }, PLACES[value] ?? value)));
+    const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties }]) => {
+      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], onchange: () => edit(() => ({ [name]: form.values() })) });
+      return form.element;
+    });
+    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...own);
   };
   let known = null;
-  const redraw = ({ problem }) => {
-    const now = JSON.stringify([problem.max_steps, problem.crs, problem.objective, materials(problem)]);
-    if (now === known) return;
-    known = now;
+  const redraw = ({ problem, fields }) => {
+    if (!fields) return;
+    const { uavs: _u, targets: _t, ...now } = problem;
+    const text = JSON.stringify([now, materials(problem)]);
+    if (text === known) return;
+    known = text;
     draw();
   };
-  subscribe(["problem"], redraw);
+  subscribe(["problem", "fields"], redraw);
   redraw(get());
 }
 
@@ -195,6 +234,6 @@ registerView({
     mountTables(dock);
     mountInspector(inspector);
     mountExamples(examples);
-    mountSettings(settings).catch((error) => notify(error.message, "error"));
+    mountSettings(settings);
   },
 });

@@ -1,7 +1,8 @@
 /** Plans to take away: flight files, GeoJSON, a table, a page to print. */
 
-import { address, ApiError, hasKey, send } from "../api.js";
+import { address, hasKey, send } from "../api.js";
 import { download, h, notify } from "../dom.js";
+import { outOfDate, staleNote } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { get, subscribe } from "../state.js";
 
@@ -22,6 +23,8 @@ const DOCUMENTS = [
   ["html", "Page to print, saved"],
 ];
 
+const ASK = "The problem was changed after this plan. Save the plan as it was made?";
+
 let parts = null;
 
 registerView({ id: "take-away", title: "Take away", order: 70, layout: "panel", mount, show: draw });
@@ -40,7 +43,7 @@ function mount(root) {
     documents: h("div", { class: "files" },
       DOCUMENTS.map(([format, text]) =>
         h("button", { type: "button", dataset: { format }, onclick: () => void take(format) }, text)),
-      h("a", { class: "button", target: "_blank", rel: "noopener", "data-testid": "print" }, "Open the page to print")),
+      h("a", { class: "button", target: "_blank", rel: "noopener", "data-testid": "print", onclick: (event) => { if (outOfDate() && !confirm(ASK)) event.preventDefault(); } }, "Open the page to print")),
   };
   const row = (text, control, only = null) => {
     const made = h("label", { class: "line" }, h("span", {}, text), control, h("span", { class: "error", role: "alert" }));
@@ -59,6 +62,7 @@ function mount(root) {
     row("After the last stop", choice("end", [["return", "return to launch"], ["land", "land there"]])));
   root.append(
     h("h2", {}, "Take it away"),
+    staleNote("stale-export", "The problem was changed after this plan: what is saved here goes where the plan was made for. Allocate again first, or undo the change."),
     parts.state,
     h("section", { class: "card" }, h("h3", {}, "Flight files"), parts.form, parts.flight),
     h("section", { class: "card" }, h("h3", {}, "The whole plan"), parts.documents));
@@ -91,6 +95,7 @@ function draw() {
 }
 
 async function take(format) {
+  if (outOfDate() && !confirm(ASK)) return;
   const { answer } = get();
   const asked = new URLSearchParams({ format });
   const flight = FILES.some(([name]) => name === format);
@@ -104,8 +109,7 @@ async function take(format) {
     download(name, await response.blob());
     parts.state.textContent = `${name} was checked and saved.`;
   } catch (error) {
-    if (!(error instanceof ApiError)) throw error;
-    for (const { parameter, detail } of error.violations) {
+    for (const { parameter, detail } of error.violations ?? []) {
       const row = parts.rows.get(parameter);
       if (row) row.made.querySelector(".error").textContent = detail;
     }

@@ -1,0 +1,25 @@
+/** What the service says of a field of the problem, with the way to it. */
+
+import { h } from "./dom.js";
+import { get, select, set } from "./state.js";
+
+const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
+
+/**
+ * A button that leads to what a JSON pointer is about.
+ * @param {string} pointer into a request
+ * @param {object} problem the one of that request
+ */
+export function wayTo(pointer, problem) {
+  const [, kind, at, ...rest] = pointer.split("/");
+  const field = rest.join("/");
+  const id = ["uavs", "targets"].includes(kind) ? problem[kind][Number(at)]?.id : undefined;
+  const go = () => {
+    if (id !== undefined && get().problem[kind].some((item) => item.id === id)) select({ kind, id });
+    set({ view: "problem" });
+    const row = `table[data-kind="${kind}"] tr[data-id="${CSS.escape(id ?? "")}"]`;
+    document.querySelector(`${row} td[data-column^="${CSS.escape(field)}"]`)?.focus();
+  };
+  const where = id === undefined ? (PARTS[pointer] ?? pointer) : [id, rest[0]].filter(Boolean).join(", ");
+  return h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where);
+}

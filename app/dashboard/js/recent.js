@@ -1,0 +1,34 @@
+/** Plans that the service still has: listed, and opened again with their problems. */
+
+import { resume } from "./allocation.js";
+import { json } from "./api.js";
+import { change, showPlan } from "./history.js";
+import { newOpening, normalised } from "./problem.js";
+import { BEGINNING, get } from "./state.js";
+
+const KINDS = new Set(["allocate", "batch"]);
+const ENDED = new Set(["succeeded", "failed", "cancelled"]);
+
+/**
+ * A page of the jobs that have plans, newest first.
+ * @param {string | null} cursor of the page
+ * @returns {Promise<{jobs: object[], next: string | null}>}
+ */
+export async function recentPlans(cursor = null) {
+  const page = await json(`jobs?limit=50${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
+  return { jobs: page.jobs.filter(({ kind }) => KINDS.has(kind)), next: page.next_cursor };
+}
+
+/**
+ * Bring a job's problem and plan on screen; a job that goes on is followed. Undoing brings back what was there.
+ * @throws {ApiError | Error} where there is no such job, or no plan
+ */
+export async function openPlan(id) {
+  const [job, given] = await Promise.all([json(`jobs/${id}`), json(`jobs/${id}/problem`)]);
+  const problem = normalised(given);
+  const opening = { problem, problemName: `Plan ${id.slice(0, 8)}`, opened: newOpening(), colours: {}, selection: null };
+  if (job.result?.routes) return showPlan(problem, job.result, opening);
+  if (ENDED.has(job.status) || !KINDS.has(job.kind)) throw new Error(`job ${id} (${job.kind}, ${job.status}) has no plan`);
+  change({ ...opening, answer: null, answerProblem: null, mission: BEGINNING, incumbent: null });
+  void resume(id, get().problem);
+}

@@ -1,0 +1,104 @@
+/** Recent plans: those of the service, and the missions that this browser has kept; each can be opened again. */
+
+import { h, notify, number } from "../dom.js";
+import { change, undo } from "../history.js";
+import { forget, isOwn, mission, missions } from "../keep.js";
+import { newOpening } from "../problem.js";
+import { openPlan, recentPlans } from "../recent.js";
+import { registerView } from "../registry.js";
+import { set } from "../state.js";
+
+const WHEN = new Intl.DateTimeFormat("en", { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" });
+
+let parts = null;
+
+registerView({ id: "recent", title: "Recent", order: 80, layout: "page", mount, show: () => void load() });
+
+function mount(root) {
+  const head = (titles) => h("thead", {}, h("tr", {}, titles.map((title) => h("th", { scope: "col" }, title))));
+  parts = {
+    plans: h("tbody", {}),
+    missions: h("tbody", {}),
+    status: h("p", { class: "muted", role: "status", "data-testid": "recent-status" }),
+    more: h("button", { type: "button", hidden: true, onclick: () => void said(next) }, "Show more"),
+    cursor: null,
+  };
+  root.append(
+    h("h2", {}, "Recent plans and missions"),
+    h("p", { class: "muted lead" }, "What is opened takes the place of what is on screen; Undo brings that back."),
+    h("section", { class: "card" }, h("h3", {}, "Plans of the service"), parts.status,
+      h("div", { class: "scroll" }, h("table", { "data-testid": "recent-plans" }, head(["Asked for", "Job", "State", "Reward", "Open"]), parts.plans)),
+      h("p", { class: "actions" }, parts.more)),
+    h("section", { class: "card" }, h("h3", {}, "Missions of this browser"),
+      h("p", { class: "muted" }, "Each tab keeps its own: problem, plan and clock."),
+      h("div", { class: "scroll" }, h("table", { "data-testid": "kept-missions" }, head(["Kept", "Problem", "Size", "Reward", "Open"]), parts.missions))));
+}
+
+async function load() {
+  parts.plans.replaceChildren();
+  parts.cursor = null;
+  await said(next);
+  await said(listMissions);
+}
+
+/** The next page of plans. */
+async function next() {
+  const { jobs, next: cursor } = await recentPlans(parts.cursor);
+  parts.plans.append(...jobs.map(planRow));
+  parts.cursor = cursor;
+  parts.more.hidden = cursor === null;
+  parts.status.textContent = parts.plans.childElementCount ? "The newest first." : "The service has no plans yet.";
+}
+
+function planRow(job) {
+  const failed = job.status === "failed";
+  const open = () => said(async () => {
+    await openPlan(job.id);
+    set({ view: ["succeeded", "cancelled"].includes(job.status) ? "answer" : "allocate" });
+    offerBack(`Plan ${job.id.slice(0, 8)} is open`);
+  });
+  return h("tr", { dataset: { job: job.id } },
+    h("td", {}, h("time", { datetime: job.created_at }, WHEN.format(new Date(job.created_at)))),
+    h("td", { title: job.id }, job.id.slice(0, 8)),
+    h("td", {}, h("span", { class: "chip", title: job.error?.detail }, job.status)),
+    h("td", {}, number(job.progress.best_reward)),
+    h("td", {}, failed ? "–" : h("button", { type: "button", "aria-label": `Open plan ${job.id.slice(0, 8)}`, onclick: open }, "Open")));
+}
+
+async function listMissions() {
+  const all = await missions();
+  parts.missions.replaceChildren(...all.map(missionRow));
+  if (!all.length) parts.missions.append(h("tr", {}, h("td", { colspan: "5" }, "None yet.")));
+}
+
+function missionRow({ id, savedAt, name, uavs, areas, reward }) {
+  const open = () => said(async () => {
+    const { job: _j, past: _p, future: _f, ...step } = (await mission(id)) ?? {};
+    if (!step.problem) return listMissions();
+    change({ ...step, opened: newOpening(), incumbent: null, selection: null });
+    offerBack(`${name} is open, as a copy`);
+    set({ view: step.answer ? "answer" : "problem" });
+  });
+  const drop = () => said(async () => {
+    if (!confirm(`Forget ${name}?`)) return;
+    await forget(id);
+    await listMissions();
+  });
+  return h("tr", { dataset: { mission: id } },
+    h("td", {}, WHEN.format(new Date(savedAt))), h("td", {}, name), h("td", {}, `${uavs} UAVs, ${areas} areas`), h("td", {}, number(reward)),
+    h("td", {}, isOwn(id) ? h("span", { class: "chip" }, "this tab")
+      : [h("button", { type: "button", "aria-label": `Open ${name}`, onclick: open }, "Open"), " ", h("button", { type: "button", class: "quiet", "aria-label": `Forget ${name}`, onclick: drop }, "Forget")]));
+}
+
+function offerBack(text) {
+  notify(text, "info", { title: "Undo", act: undo });
+}
+
+/** Do something, and say what went wrong with it. */
+async function said(act) {
+  try {
+    await act();
+  } catch (error) {
+    notify(error.message, "error");
+  }
+}
