@@ -163,10 +163,61 @@ def test_an_answer_that_is_out_of_date_says_so(ready):
     start(page, "greedy")
     page.wait_for_selector("#figures")
     expect(page.locator("#stale")).to_be_hidden()
+    page.click("#tab-problem")
     page.locator(".symbol.targets").first.click()
     page.locator("#map").focus()
     page.keyboard.press("Delete")
+    page.click("#tab-answer")
     expect(page.locator("#stale")).to_be_visible()
+
+
+def test_the_keyboard_allocates_at_once_on_a_fresh_page(page):
+    page.wait_for_selector("html[data-ready]")
+    page.locator("body").press("Control+Enter")
+    page.wait_for_selector("#figures")
+
+
+def test_an_answer_by_another_algorithm_and_its_warnings_are_shown(ready):
+    page = ready
+    start(page, "greedy")
+    page.wait_for_selector("#figures")
+    expect(page.get_by_test_id("answered-by")).to_have_count(0)
+    expect(page.get_by_test_id("warnings")).to_have_count(0)
+    page.evaluate(
+        """async () => {
+            const { get, set } = await import("/dashboard/js/state.js");
+            const warnings = [{ pointer: "/targets/3/x", code: "far_away", detail: "area-4 is 8300 km from every base" }];
+            set({ answer: { ...get().answer, algorithm: "auto", answered_by: "greedy", warnings } });
+        }"""
+    )
+    expect(page.get_by_test_id("answered-by")).to_have_text("answered by greedy, not auto")
+    expect(page.get_by_test_id("warnings")).to_contain_text("area-4 is 8300 km from every base")
+    page.get_by_test_id("warnings").get_by_role("button").click()
+    expect(page.locator("table[data-kind=targets] tr[data-id=area-4] td[data-column=x]")).to_be_focused()
+
+
+def test_what_was_clicked_stays_under_the_pointer(ready):
+    page = ready
+    page.set_viewport_size({"width": 1280, "height": 500})
+    start(page, "greedy")
+    page.wait_for_selector("#figures")
+    unmet = page.evaluate(
+        """async () => {
+            const { get, set } = await import("/dashboard/js/state.js");
+            const { answer } = get();
+            const visited = answer.routes.filter(({ stops }) => stops.length)[0].stops[0].target_id;
+            const unmet = [...answer.unmet, { ...answer.unmet[0], target_id: visited, remaining: [1, 1, 1, 1], code: "loads_used", reason: "" }];
+            set({ answer: { ...answer, unmet } });
+            return visited;
+        }"""
+    )
+    button = page.locator(f"#unmet li[data-target-id='{unmet}'] button").last
+    button.scroll_into_view_if_needed()
+    before = button.bounding_box()
+    button.click()
+    expect(page.locator("#routes tr.chosen").first).to_be_attached()
+    assert button.bounding_box() == before
+    page.locator(f".symbol.targets[data-id='{unmet}']").dispatch_event("click")
 
 
 def test_the_keyboard_alone_allocates(ready):
