@@ -9,12 +9,12 @@ const NO_LIMIT = 1e9;
 /**
  * Fields of an object's schema.
  * @param {Record<string, object>} properties JSON schemas by name
- * @param {{pointer: string, values?: object, defs?: object, onchange?: () => void}} options
+ * @param {{pointer: string, values?: object, defs?: object, titles?: object, onchange?: () => void}} options
  *   pointer is the JSON pointer of the object in the request, by which refusals find the field
  */
 export class Fields {
-  constructor(properties, { pointer, values = {}, defs = {}, onchange = () => {} }) {
-    this.fields = Object.entries(properties).map(([name, schema]) => makeField(name, resolved(schema, defs), `${pointer}/${name}`, values[name], onchange));
+  constructor(properties, { pointer, values = {}, defs = {}, titles = {}, onchange = () => {} }) {
+    this.fields = Object.entries(properties).map(([name, schema]) => makeField(name, resolved(schema, defs), { pointer: `${pointer}/${name}`, value: values[name], title: titles[name], onchange }));
     this.element = h("div", { class: "fields" }, this.fields.map((field) => field.element));
   }
 
@@ -50,12 +50,12 @@ export function labelled(title, input, { pointer, hint } = {}) {
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }
 
-function makeField(name, schema, pointer, value, onchange) {
+function makeField(name, schema, { pointer, value, title = titleOf(name), onchange }) {
   const given = value ?? schema.default;
   const input = inputFor(schema, given);
   input.name = name;
   input.addEventListener("change", onchange);
-  const element = labelled(titleOf(name), input, { pointer, hint: [forPeople(schema.description), range(schema)].filter(Boolean).join(". ") });
+  const element = labelled(title, input, { pointer, hint: [forPeople(schema.description), range(schema)].filter(Boolean).join(". ") });
   return { name, element, read: () => valueOf(schema, input) };
 }
 

@@ -8,9 +8,9 @@ export function resolved(schema, defs) {
 }
 
 /**
- * The fields of a problem.
+ * The fields of a problem, and the algorithms that learn.
  * @param {object} openapi the document
- * @returns {{uavs: object, targets: object, settings: object, request: object, defs: object}} JSON schemas by name, references
+ * @returns {{learners: string[], uavs: object, targets: object, settings: object, request: object}} JSON schemas by name, references
  *   taken out: of a UAV, of an area (`needed`: it has no default), of the problem besides its lists, and of `POST /allocate` besides the problem
  */
 export function fieldsOf(openapi) {
@@ -23,7 +23,8 @@ export function fieldsOf(openapi) {
   };
   const request = Object.entries(all(defs.AllocationRequest.properties)).filter(([name]) => !(name in defs.ProblemModel.properties));
   for (const [name, schema] of Object.entries(settings)) if (schema.properties) settings[name] = { ...schema, properties: all(schema.properties) };
-  return { uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request), defs };
+  const learners = defs.TrainingModel.properties.algorithm.enum;
+  return { learners, uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request) };
 }
 
 /** Whether a field holds one amount a material. */

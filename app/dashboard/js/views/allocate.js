@@ -8,8 +8,10 @@ import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
 import { get, set, subscribe } from "../state.js";
 
+/** The field that asks to keep what is learned: only some algorithms learn. */
+const KEEPING = "keep_checkpoint";
 const PREFERRED = ["auto", "transfer_qmix"];
-const OWN_FIELDS = new Set(["algorithm", "parameters"]);
+const OWN_FIELDS = new Set(["algorithm", "parameters", KEEPING]);
 const FIRST_LIMIT_S = 5;
 const REDRAW_MS = 150;
 const SAY_EVERY_MS = 6000;
@@ -24,19 +26,23 @@ function makeForm() {
   const place = h("div", {});
   const rest = Object.fromEntries(Object.entries(fields.request).filter(([name]) => !OWN_FIELDS.has(name)));
   const limits = new Fields(rest, { pointer: "", values: { time_limit_s: FIRST_LIMIT_S } });
+  const kept = fields.request[KEEPING] ? { [KEEPING]: fields.request[KEEPING] } : {};
+  const keeping = new Fields(kept, { pointer: "", titles: { [KEEPING]: "Keep what is learned" } });
+  const learns = () => fields.learners.includes(choice.value);
   let parameters;
   const choose = () => {
     const algorithm = algorithms.find(({ name }) => name === choice.value);
     summary.textContent = algorithm.summary;
     parameters = new Fields(algorithm.parameters.properties ?? {}, { pointer: "/parameters", defs: algorithm.parameters.$defs });
     place.replaceChildren(parameters.element);
+    keeping.element.hidden = !learns();
   };
   choose();
   const elsewhere = h("ul", { class: "violations", id: "violations" });
   const start = h("button", { class: "primary", title: "Ctrl+Enter", id: "start" }, "Allocate");
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
   const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
-    labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element,
+    labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element,
     h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place),
     h("div", { class: "row" }, start, stop), elsewhere);
   form.addEventListener("submit", (event) => {
@@ -44,7 +50,7 @@ function makeForm() {
     const { job, problem } = get();
     const none = ["uavs", "targets"].filter((kind) => !problem[kind].length);
     if (none.length) set({ violations: none.map((kind) => ({ pointer: `/${kind}`, detail: "none yet: place at least one on the map" })) });
-    else if (!running(job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values() });
+    else if (!running(job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values(), ...(learns() ? keeping.values() : {}) });
   });
   const enable = () => {
     start.disabled = running(get().job);

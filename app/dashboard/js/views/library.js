@@ -53,20 +53,21 @@ function mount(root) {
         h("p", { class: "actions" }, parts.train, " ", parts.cancel),
         parts.progress, parts.watched, parts.curve)),
     parts.status, parts.cards, h("p", { class: "actions" }, parts.more));
-  subscribe(["answer", "problemName"], hint);
+  subscribe(["answer", "problemName", "fields"], hint);
   subscribe(["problem"], () => { if (get().view === "library") void load(); });
   hint();
 }
 
 function hint() {
-  const { answer, problemName } = get();
-  const learned = answer && ["qmix", "transfer_qmix"].includes(answer.algorithm);
+  const { answer, problemName, fields } = get();
+  const learners = fields?.learners ?? [];
+  const learned = answer && learners.includes(answer.algorithm);
   parts.register.disabled = !learned;
   parts.registerHint.textContent = !answer
     ? "There is no allocation yet."
     : learned
-      ? `${answer.algorithm}, reward ${shown(answer.reward)}. An allocation has a policy of its own where it was fine-tuned.`
-      : `${answer.algorithm} learns nothing; allocate with transfer_qmix or qmix.`;
+      ? `${answer.algorithm}, reward ${shown(answer.reward)}. It has a policy of its own where it was fine-tuned and allocated with “Keep what is learned”.`
+      : `${answer.algorithm} learns nothing; allocate with ${learners.join(" or ")}, and with “Keep what is learned”.`;
   if (!parts.trainName.value) parts.trainName.value = problemName || "my task";
   if (!parts.registerName.value) parts.registerName.value = `${problemName || "my task"}, fine-tuned`;
 }

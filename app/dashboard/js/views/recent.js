@@ -27,11 +27,11 @@ function mount(root) {
     h("h2", {}, "Recent plans and missions"),
     h("p", { class: "muted lead" }, "What is opened takes the place of what is on screen; Undo brings that back."),
     h("section", { class: "card" }, h("h3", {}, "Plans of the service"), parts.status,
-      h("div", { class: "scroll" }, h("table", { "data-testid": "recent-plans" }, head(["Asked for", "Job", "State", "Reward", "Open"]), parts.plans)),
+      h("div", { class: "scroll" }, h("table", { "data-testid": "recent-plans" }, head(["Open", "Asked for", "Job", "State", "Reward"]), parts.plans)),
       h("p", { class: "actions" }, parts.more)),
     h("section", { class: "card" }, h("h3", {}, "Missions of this browser"),
       h("p", { class: "muted" }, "Each tab keeps its own: problem, plan and clock."),
-      h("div", { class: "scroll" }, h("table", { "data-testid": "kept-missions" }, head(["Kept", "Problem", "Size", "Reward", "Open"]), parts.missions))));
+      h("div", { class: "scroll" }, h("table", { "data-testid": "kept-missions" }, head(["Open", "Kept", "Problem", "Size", "Reward"]), parts.missions))));
 }
 
 async function load() {
@@ -58,11 +58,11 @@ function planRow(job) {
     offerBack(`Plan ${job.id.slice(0, 8)} is open`);
   });
   return h("tr", { dataset: { job: job.id } },
+    h("td", {}, failed ? "–" : h("button", { type: "button", "aria-label": `Open plan ${job.id.slice(0, 8)}`, onclick: open }, "Open")),
     h("td", {}, h("time", { datetime: job.created_at }, WHEN.format(new Date(job.created_at)))),
     h("td", { title: job.id }, job.id.slice(0, 8)),
     h("td", {}, h("span", { class: "chip", title: job.error?.detail }, job.status)),
-    h("td", {}, number(job.progress.best_reward)),
-    h("td", {}, failed ? "–" : h("button", { type: "button", "aria-label": `Open plan ${job.id.slice(0, 8)}`, onclick: open }, "Open")));
+    h("td", {}, number(job.progress.best_reward)));
 }
 
 async function listMissions() {
@@ -85,9 +85,9 @@ function missionRow({ id, savedAt, name, uavs, areas, reward }) {
     await listMissions();
   });
   return h("tr", { dataset: { mission: id } },
-    h("td", {}, WHEN.format(new Date(savedAt))), h("td", {}, name), h("td", {}, `${uavs} UAVs, ${areas} areas`), h("td", {}, number(reward)),
     h("td", {}, isOwn(id) ? h("span", { class: "chip" }, "this tab")
-      : [h("button", { type: "button", "aria-label": `Open ${name}`, onclick: open }, "Open"), " ", h("button", { type: "button", class: "quiet", "aria-label": `Forget ${name}`, onclick: drop }, "Forget")]));
+      : [h("button", { type: "button", "aria-label": `Open ${name}`, onclick: open }, "Open"), " ", h("button", { type: "button", class: "quiet", "aria-label": `Forget ${name}`, onclick: drop }, "Forget")]),
+    h("td", {}, WHEN.format(new Date(savedAt))), h("td", {}, name), h("td", {}, `${uavs} UAVs, ${areas} areas`), h("td", {}, number(reward)));
 }
 
 function offerBack(text) {
