@@ -293,7 +293,9 @@ def test_the_problem_of_a_job_is_the_one_that_was_sent(client, problem):
 
     assert found["objective"] == sent["objective"]
     assert found["uavs"][0] == {**sent["uavs"][0], "y_c": sent["uavs"][0]["y_s"]}
-    assert [uav["id"] for uav in found["uavs"][1:]] == [uav.get("id", f"uav-{n}") for n, uav in enumerate(sent["uavs"][1:], 2)]
+    assert [uav["id"] for uav in found["uavs"][1:]] == [
+        uav.get("id", f"uav-{n}") for n, uav in enumerate(sent["uavs"][1:], 2)
+    ]
     assert "x_c" not in found["uavs"][1]
     assert found["targets"][0]["deadline"] == 40.0
     again = client.post("/allocate", json={**found, "algorithm": "greedy"}).json()

@@ -268,6 +268,15 @@ def test_csv_has_a_row_an_event():
     assert float(rows[3]["time"]) == pytest.approx(1.604 + 76.7 / 72.0)
 
 
+def test_csv_has_no_formula():
+    ids = ("=1+1", "'@SUM(1)")
+    rows = list(csv.DictReader(io.StringIO(csv_table(two_visits(ids=ids)))))
+
+    assert {row["uav_id"] for row in rows} == {"'=1+1", "''@SUM(1)"}
+    assert {row["target_id"] for row in rows} == {"", "north <&>", "east"}
+    assert all(float(row["y"]) < 0 for row in rows)
+
+
 def test_printed_page_has_every_stop_and_escapes_ids():
     page = printed_page(two_visits())
 

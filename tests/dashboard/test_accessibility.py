@@ -12,7 +12,7 @@ RULES = {
         "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
     },
 }
-VIEWS = ("problem", "allocate", "answer", "compare", "field", "library", "take-away")
+VIEWS = ("problem", "allocate", "answer", "compare", "field", "library", "take-away", "recent")
 FOCUSED = "document.activeElement.id || document.activeElement.textContent"
 
 

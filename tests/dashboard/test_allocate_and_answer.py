@@ -186,7 +186,8 @@ def test_an_answer_by_another_algorithm_and_its_warnings_are_shown(ready):
     page.evaluate(
         """async () => {
             const { get, set } = await import("/dashboard/js/state.js");
-            const warnings = [{ pointer: "/targets/3/x", code: "far_away", detail: "area-4 is 8300 km from every base" }];
+            const detail = "area-4 is 8300 km from every base";
+            const warnings = [{ pointer: "/targets/3/x", code: "far_away", detail }];
             set({ answer: { ...get().answer, algorithm: "auto", answered_by: "greedy", warnings } });
         }"""
     )
@@ -206,7 +207,8 @@ def test_what_was_clicked_stays_under_the_pointer(ready):
             const { get, set } = await import("/dashboard/js/state.js");
             const { answer } = get();
             const visited = answer.routes.filter(({ stops }) => stops.length)[0].stops[0].target_id;
-            const unmet = [...answer.unmet, { ...answer.unmet[0], target_id: visited, remaining: [1, 1, 1, 1], code: "loads_used", reason: "" }];
+            const less = { target_id: visited, remaining: [1, 1, 1, 1], code: "loads_used", reason: "" };
+            const unmet = [...answer.unmet, { ...answer.unmet[0], ...less }];
             set({ answer: { ...answer, unmet } });
             return visited;
         }"""

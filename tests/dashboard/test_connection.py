@@ -12,10 +12,13 @@ SILENT = """
     const timers = [];
     globalThis.setTimeout = (act, wait) => timers.push({ act, wait }) && timers.length;
     globalThis.clearTimeout = (timer) => { if (timer) timers[timer - 1].act = null; };
-    const event = (id, name, data) => new TextEncoder().encode(`id: ${id}\\nevent: ${name}\\ndata: ${JSON.stringify(data)}\\n\\n`);
+    const event = (id, name, data) =>
+        new TextEncoder().encode(`id: ${id}\\nevent: ${name}\\ndata: ${JSON.stringify(data)}\\n\\n`);
     let left = false;
-    const silent = new ReadableStream({ start: (to) => to.enqueue(event(1, "progress", { n: 1 })), cancel: () => { left = true; } });
-    const ending = new ReadableStream({ start: (to) => { to.enqueue(event(2, "end", { n: 2 })); to.close(); } });
+    const cancel = () => { left = true; };
+    const silent = new ReadableStream({ start: (to) => to.enqueue(event(1, "progress", { n: 1 })), cancel });
+    const end = (to) => { to.enqueue(event(2, "end", { n: 2 })); to.close(); };
+    const ending = new ReadableStream({ start: end });
     const asked = [];
     globalThis.fetch = async (url, { headers }) => {
         asked.push([url, headers["Last-Event-ID"] ?? null]);
@@ -42,7 +45,10 @@ def test_a_stream_that_goes_silent_is_asked_for_again():
     found = run_module(SILENT)
     assert found["before"] == {"heard": [1], "waiting": [40_000]}
     assert found["heard"] == [1, 2]
-    assert found["asked"][:2] == [["http://service/jobs/j/events", None], ["http://service/jobs/j/events", "1"]]
+    assert found["asked"][:2] == [
+        ["http://service/jobs/j/events", None],
+        ["http://service/jobs/j/events", "1"],
+    ]
     assert (found["lost"], found["left"], found["job"]["status"]) == (1, True, "succeeded")
 
 
@@ -98,7 +104,10 @@ def test_a_tab_that_nobody_sees_asks_nothing(away, service):
     page.goto(service.url)
     ready(page)
     expect(page.locator("#service")).to_have_text("Ready")
-    hide = "(hidden) => { Object.defineProperty(document, 'hidden', { configurable: true, get: () => hidden }); document.dispatchEvent(new Event('visibilitychange')); }"
+    hide = """(hidden) => {
+        Object.defineProperty(document, "hidden", { configurable: true, get: () => hidden });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }"""
     page.evaluate(hide, True)
     before = len(asked)
     page.clock.run_for(60_000)

@@ -5,6 +5,7 @@ import math
 import httpx
 import pytest
 from dashboard_steps import go, open_problem, ready, show_answer, state
+from page_modules import run_module
 from playwright.sync_api import expect
 from referee import replay
 
@@ -162,3 +163,83 @@ def test_uavs_on_their_way_home_are_called_back_only_where_that_is_chosen(page, 
     flown = [bool(route["stops"]) for route in answer["routes"]]
     assert [uav["ret"] for uav in kept["uavs"]] == [int(flies) for flies in flown]
     assert [uav["ret"] for uav in recalled["uavs"]] == [0] * len(flown)
+
+
+MID_MISSION = """
+    const { changes, problemAt, remainder, withNeeds } = await load("mid_mission.js");
+    const { met } = await load("plan.js");
+    const now = problemAt(given.problem, given.answer, given.time);
+    const rest = remainder(given.problem, given.answer, given.time);
+    return {
+        now,
+        more: withNeeds(now.targets[0], [12, 0]),
+        fewer: withNeeds(now.targets[0], [0, 0]),
+        untouched: withNeeds(now.targets[2], [1, 0]),
+        met: [...met(now, null).values()],
+        metThen: [...met(now, { unmet: [{ target_id: "half", remaining: [1, 0] }] }).values()],
+        kept: changes(now, rest, { routes: [], reward: 0, distance_weight: 0 }),
+    };
+"""
+
+
+def test_what_an_area_asked_for_at_first_stays_the_measure_of_what_it_has():
+    """82 are needed, 80 come at time 1; 90 were asked for at another area, of which 40 came before."""
+    uav = {"id": "u", "x_s": 0, "y_s": 0, "speed": 1, "voyage": 99, "loadlist": [130, 0]}
+    place = {"x": 1, "y": 0}
+    problem = {
+        "uavs": [uav],
+        "targets": [
+            {"id": "nearly", **place, "level": 2, "loadlist": [82, 0]},
+            {"id": "half", **place, "level": 3, "loadlist": [50, 0], "requested": [90, 0]},
+            {"id": "none", **place, "level": 1, "loadlist": [5, 5]},
+        ],
+    }
+    stops = [
+        {"target_id": "nearly", "step": 1, "arrival_time": 1, "distance": 1, "delivered": [80, 0]},
+        {"target_id": "half", "step": 2, "arrival_time": 2, "distance": 1, "delivered": [45, 0]},
+    ]
+    answer = {
+        "routes": [{"uav_id": "u", "distance": 2, "return_distance": 1, "stops": stops}],
+        "distance_weight": 0,
+    }
+
+    found = run_module(MID_MISSION, {"problem": problem, "answer": answer, "time": 1.5})
+
+    nearly, half, none = found["now"]["targets"]
+    assert (nearly["loadlist"], nearly["requested"]) == ([2, 0], [82, 0])
+    assert (half["loadlist"], half["requested"]) == ([50, 0], [90, 0])
+    assert (none["loadlist"], "requested" in none) == ([5, 5], False)
+    assert (found["more"]["loadlist"], found["more"]["requested"]) == ([12, 0], [92, 0])
+    assert (found["fewer"]["loadlist"], found["fewer"]["requested"]) == ([0, 0], [80, 0])
+    assert "requested" not in found["untouched"]
+    assert found["met"] == pytest.approx([80 / 82, 40 / 90, 0])
+    assert found["metThen"] == pytest.approx([1, 89 / 90, 1])
+    # What is still to come earns as the service reckons it: level · delivered / requested.
+    assert found["kept"]["kept"]["satisfaction"] == pytest.approx(3 * 45 / 90)
+    assert [area["before"] for area in found["kept"]["areas"]] == pytest.approx([80 / 82, 85 / 90, 0])
+    assert [area["after"] for area in found["kept"]["areas"]] == pytest.approx([80 / 82, 40 / 90, 0])
+
+
+def test_an_area_that_is_nearly_served_is_shown_and_weighed_as_that(page, service):
+    ready(page)
+    answer = show_answer(page, service.url, algorithm="greedy")
+    first = min(
+        (stop for route in answer["routes"] for stop in route["stops"]), key=lambda s: s["arrival_time"]
+    )
+    wanted = next(t for t in state(page, "problem")["targets"] if t["id"] == first["target_id"])["loadlist"]
+    go(page, "field")
+    page.get_by_role("button", name="Next event").click()
+    row = page.locator(f"[data-testid=field-areas] tr[data-area={first['target_id']}]")
+    expect(row).to_contain_text(f"of {wanted[0]:g}")
+    page.locator("#view-field select[name=algorithm]").select_option("greedy")
+    page.get_by_role("button", name="Allocate again from here").click()
+    expect(page.get_by_test_id("field-changes")).to_be_visible()
+
+    asked = next(t for t in state(page, "answerProblem")["targets"] if t["id"] == first["target_id"])
+    assert asked["requested"] == wanted
+    assert asked["loadlist"] == pytest.approx([wanted[0] - first["delivered"][0]])
+    go(page, "problem")
+    cell = page.locator(
+        f"table[data-kind=targets] tr[data-id={first['target_id']}] td[data-column='requested/0']"
+    )
+    expect(cell).to_have_text(f"{wanted[0]:g}")

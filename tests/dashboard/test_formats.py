@@ -1,4 +1,4 @@
-"""Files of the dashboard: what goes out comes back the same, and other people's are read as they are found."""
+"""Files of the dashboard: what goes out comes back the same; other people's are read as they are found."""
 
 import base64
 import json
@@ -59,8 +59,32 @@ def read(openapi):
 class Maker:
     """Makes values of JSON schemas, so that a field that is added later is tried too."""
 
-    SPECIAL = ("=1+1", "@a", "+b", "-c", "\tt", "'=x", "''@", "'plain", "a,b", "a;b", 'q"q', " edge ", "új 村 ‍", "#1",
-               "007", "1,5", "true", "|", "line\nbreak", "﻿mark", "[1]", "<b>", "kind", "sep=;")  # fmt: skip
+    SPECIAL = (
+        "=1+1",
+        "@a",
+        "+b",
+        "-c",
+        "\tt",
+        "'=x",
+        "''@",
+        "'plain",
+        "a,b",
+        "a;b",
+        'q"q',
+        " edge ",
+        "új 村 ‍",
+        "#1",
+        "007",
+        "1,5",
+        "true",
+        "|",
+        "line\nbreak",
+        "﻿mark",
+        "[1]",
+        "<b>",
+        "kind",
+        "sep=;",
+    )
 
     def __init__(self, seed, components, materials):
         self.random = random.Random(seed)
@@ -227,32 +251,55 @@ def csv(*rows, head=HEAD):
         (csv("uav,u1,0,zero,1,10,,,,7"), "line 2: `y_s` is no number: zero"),
         (csv("", "", "uav,u1,0,0x10,1,10,,,,7"), "line 4: `y_s` is no number: 0x10"),
         (csv('uav,"a\nb",0,0,1,10,,,,7', "uav,c,0,,1,1e999,,,,7"), "line 4: `voyage` is no number: 1e999"),
-        (csv('uav,u1,"34,8",0,1,10,,,,7'), "line 2: `x_s` has a decimal comma, in a file with commas between the cells: 34,8"),
-        (csv("uav;u1;1.5;0;1;10;;;;7,5", head=HEAD.replace(",", ";")),
-         "line 2: `load_1` is ambiguous: line 2 has a decimal point, 1.5: 7,5"),
-        (csv("uav;u1;1.234,5;0;1;10;;;;7", head=HEAD.replace(",", ";")), "line 2: `x_s` is no number: 1.234,5"),
+        (
+            csv('uav,u1,"34,8",0,1,10,,,,7'),
+            "line 2: `x_s` has a decimal comma, in a file with commas between the cells: 34,8",
+        ),
+        (
+            csv("uav;u1;1.5;0;1;10;;;;7,5", head=HEAD.replace(",", ";")),
+            "line 2: `load_1` is ambiguous: line 2 has a decimal point, 1.5: 7,5",
+        ),
+        (
+            csv("uav;u1;1.234,5;0;1;10;;;;7", head=HEAD.replace(",", ";")),
+            "line 2: `x_s` is no number: 1.234,5",
+        ),
         (csv('uav,u1,0,0,1,10,,,"7'), "line 2: a quote is out of place"),
         (csv("uav,u1,0,0,1,10,,,,7,8"), "line 2: it has 11 cells for 10 columns"),
         (csv("base,u1,0,0,1,10,,,,7"), "line 2: `kind` is neither uav, area nor problem: base"),
         (csv("uav,u1,0,0,1,,,,,7"), "UAV u1 has no `voyage`"),
-        ("name,lat,lon\na,1,2\n", "line 1: it has to name the columns, and `kind` is not among them (found: name, lat, lon)"),
+        (
+            "name,lat,lon\na,1,2\n",
+            "line 1: it has to name the columns, and `kind` is not among them (found: name, lat, lon)",
+        ),
         ("", "it is empty"),
         (csv(head=HEAD + ",load_1"), "line 1: two columns are named `load_1`"),
-        (csv("uav,u1,0,0,1,10,,,,7,1", head=HEAD + ",load_3"), "line 2: there is no column `load_2`, but one after it"),
-        (csv("problem,,,,,,,,,,maybe", head=HEAD + ",return_to_base"),
-         "line 2: `return_to_base` is neither true nor false: maybe"),
-        (csv("problem,,,,,,,,,,mercator", head=HEAD + ",crs"), "line 2: `crs` is none of local, wgs84: mercator"),
+        (
+            csv("uav,u1,0,0,1,10,,,,7,1", head=HEAD + ",load_3"),
+            "line 2: there is no column `load_2`, but one after it",
+        ),
+        (
+            csv("problem,,,,,,,,,,maybe", head=HEAD + ",return_to_base"),
+            "line 2: `return_to_base` is neither true nor false: maybe",
+        ),
+        (
+            csv("problem,,,,,,,,,,mercator", head=HEAD + ",crs"),
+            "line 2: `crs` is none of local, wgs84: mercator",
+        ),
         (csv("problem,,,,,,,,,", "problem,,,,,,,,,"), "line 3: the settings stand in line 2 already"),
         (b"PK\x03\x04\x00\x00\x00\x00\x00\x00", "this is no text in UTF-8, UTF-16 or Windows-1252"),
         ('{"uavs": [], "targets": {}}', "it has no lists `uavs` and `targets`, and is no FeatureCollection"),
         ("[1, 2]", "it has no lists `uavs` and `targets`, and is no FeatureCollection"),
         (json.dumps({"uavs": [7], "targets": []}), "UAV 1 is no object"),
-        (json.dumps({"uavs": [], "targets": [{"id": "a", "x": 0, "y": "1", "level": 1, "loadlist": [1]}]}),
-         'area a: `y` is "1", a number is needed'),
-        (json.dumps({"uavs": [], "targets": [{"x": 0, "y": 1, "level": 1, "loadlist": [1, None]}]}),
-         "area 1: `loadlist` is [1,null], a list of numbers is needed"),
+        (
+            json.dumps({"uavs": [], "targets": [{"id": "a", "x": 0, "y": "1", "level": 1, "loadlist": [1]}]}),
+            'area a: `y` is "1", a number is needed',
+        ),
+        (
+            json.dumps({"uavs": [], "targets": [{"x": 0, "y": 1, "level": 1, "loadlist": [1, None]}]}),
+            "area 1: `loadlist` is [1,null], a list of numbers is needed",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_read_is_refused_with_its_place(read, content, message):
     assert read(content) == {"refused": message}
 
@@ -278,7 +325,9 @@ def test_texts_are_no_formulas_in_a_table_and_come_back(openapi):
     assert "'@SUM(1+1)*cmd|" in written
     found = run_module(AGAIN, {"openapi": openapi, "problems": [problem], "present": PRESENT})[0]
     for again in found:
-        assert [each["id"] for each in again["problem"]["targets"]] == [each["id"] for each in problem["targets"]]
+        assert [each["id"] for each in again["problem"]["targets"]] == [
+            each["id"] for each in problem["targets"]
+        ]
 
 
 def test_names_that_repeat_are_numbered_and_said(read):
@@ -300,7 +349,10 @@ def test_names_that_repeat_are_numbered_and_said(read):
 
 def test_a_name_of_full_length_is_numbered_within_its_length(read):
     area = {"id": "x" * 100, "x": 0, "y": 0, "level": 1, "loadlist": [1]}
-    ids = [target["id"] for target in read(json.dumps({"uavs": [], "targets": [area, area]}))["problem"]["targets"]]
+    ids = [
+        target["id"]
+        for target in read(json.dumps({"uavs": [], "targets": [area, area]}))["problem"]["targets"]
+    ]
     assert ids == ["x" * 100, "x" * 96 + " (2)"]
 
 
@@ -344,14 +396,29 @@ def test_features_are_read_as_they_are_found(read):
             feature(point(1, 2, 300), id=None),
             feature(point(1, 2), properties={"id": 7}),
             feature(point(1, 2), id=8),
-            feature({"type": "MultiPoint", "coordinates": [[3, 4]]}, properties={"loadlist": "[ 4.0 ]", "deadline": None}),
+            feature(
+                {"type": "MultiPoint", "coordinates": [[3, 4]]},
+                properties={"loadlist": "[ 4.0 ]", "deadline": None},
+            ),
             feature({"type": "Polygon", "coordinates": [SQUARE]}, id="school"),
             feature({"type": "MultiPolygon", "coordinates": [[[[0, 0], [1, 0], [0, 1], [0, 0]]], [SQUARE]]}),
-            feature(point(5, 6), properties={"kind": "UAV", "speed": 1, "voyage": 9, "x_s": 0, "y_s": 0, "x_c": 1, "y_c": 1, "level": None}),
+            feature(
+                point(5, 6),
+                properties={
+                    "kind": "UAV",
+                    "speed": 1,
+                    "voyage": 9,
+                    "x_s": 0,
+                    "y_s": 0,
+                    "x_c": 1,
+                    "y_c": 1,
+                    "level": None,
+                },
+            ),
             feature(point(5, 6), properties={"kind": "uav", "speed": 1, "voyage": 9, "x_s": 0, "y_s": 0}),
             crs={"type": "name", "properties": {"name": "EPSG:4326"}},
         )
-    )  # fmt: skip
+    )
     targets = found["problem"]["targets"]
     assert [target["id"] for target in targets] == ["area-1", "7", "8", "area-4", "school", "area-6"]
     assert [(target["x"], target["y"]) for target in targets] == [(1, 2)] * 3 + [(3, 4), (11, 1), (11, 1)]
@@ -369,20 +436,40 @@ def test_features_are_read_as_they_are_found(read):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (collection(feature(point(1, 2)), crs={"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}),
-         "its `crs` is urn:ogc:def:crs:EPSG::3857: save it with longitude and latitude on WGS 84 (EPSG:4326)"),
-        (collection(feature(point(8970000, 3340000), id="a")),
-         "feature 1 (a) is at 8970000, 3340000: these are no degrees of longitude and latitude"),
-        (collection(feature(point(1, 2)), feature({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, properties={"Name": "road"})),
-         "feature 2 (road) is a LineString: a UAV or an area is one point"),
-        (collection(feature({"type": "MultiPoint", "coordinates": [[0, 0], [1, 1]]})),
-         "feature 1 is a MultiPoint of 2 points: a UAV or an area is one point"),
+        (
+            collection(
+                feature(point(1, 2)),
+                crs={"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}},
+            ),
+            "its `crs` is urn:ogc:def:crs:EPSG::3857: "
+            "save it with longitude and latitude on WGS 84 (EPSG:4326)",
+        ),
+        (
+            collection(feature(point(8970000, 3340000), id="a")),
+            "feature 1 (a) is at 8970000, 3340000: these are no degrees of longitude and latitude",
+        ),
+        (
+            collection(
+                feature(point(1, 2)),
+                feature({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, properties={"Name": "road"}),
+            ),
+            "feature 2 (road) is a LineString: a UAV or an area is one point",
+        ),
+        (
+            collection(feature({"type": "MultiPoint", "coordinates": [[0, 0], [1, 1]]})),
+            "feature 1 is a MultiPoint of 2 points: a UAV or an area is one point",
+        ),
         (collection(feature(point("1", "2"))), 'feature 1 has coordinates that are no numbers: ["1","2"]'),
-        (collection(feature(point(1, 2), properties={"kind": "school"}, id="a")),
-         "feature 1 (a) has no property `kind` that is uav or area"),
-        (collection(feature(point(1, 2), properties={"level": "high"}, id="a")), 'area a: `level` is "high", a number is needed'),
+        (
+            collection(feature(point(1, 2), properties={"kind": "school"}, id="a")),
+            "feature 1 (a) has no property `kind` that is uav or area",
+        ),
+        (
+            collection(feature(point(1, 2), properties={"level": "high"}, id="a")),
+            'area a: `level` is "high", a number is needed',
+        ),
         (json.dumps({"type": "FeatureCollection"}), "it has no list `features`"),
     ],
-)  # fmt: skip
+)
 def test_a_map_that_cannot_be_read_is_refused_with_its_feature(read, content, message):
     assert read(content) == {"refused": message}

@@ -103,7 +103,10 @@ def test_a_tab_that_was_duplicated_overwrites_nothing(page, service):
     page.wait_for_selector(KEPT)
     mission = page.evaluate("sessionStorage.getItem('dispatch-mission')")
     double = page.context.new_page()
-    double.add_init_script(f"sessionStorage.getItem('dispatch-mission') ?? sessionStorage.setItem('dispatch-mission', '{mission}')")
+    double.add_init_script(
+        "sessionStorage.getItem('dispatch-mission')"
+        f" ?? sessionStorage.setItem('dispatch-mission', '{mission}')"
+    )
     double.goto(service.url)
     ready(double)
     assert level(double) == 0.25
@@ -124,7 +127,9 @@ def test_a_tab_that_was_duplicated_overwrites_nothing(page, service):
 def test_the_largest_problem_survives_too(page):
     page.set_default_timeout(120_000)
     ready(page)
-    uavs = [{"id": f"u{i}", "x_s": i, "y_s": 0, "speed": 1, "voyage": 9, "loadlist": [1] * 8} for i in range(1000)]
+    uavs = [
+        {"id": f"u{i}", "x_s": i, "y_s": 0, "speed": 1, "voyage": 9, "loadlist": [1] * 8} for i in range(1000)
+    ]
     targets = [{"id": f"a{j}", "x": j, "y": 1, "level": 1, "loadlist": [1] * 8} for j in range(2000)]
     open_problem(page, {"uavs": uavs, "targets": targets}, "large")
     page.wait_for_selector(KEPT)
@@ -168,11 +173,15 @@ def test_what_replaces_a_mission_can_be_undone(page, service, how):
     set_level(page, 0.25)
     answer = show_answer(page, service.url, algorithm="greedy")
     at_a_moment(page)
-    before = {key: state(page, key) for key in ("problem", "problemName", "answer", "answerProblem", "mission")}
+    before = {
+        key: state(page, key) for key in ("problem", "problemName", "answer", "answerProblem", "mission")
+    }
     go(page, "problem")
     if how == "file":
         content = json.dumps(example_problem("paper-5x10")).encode()
-        page.locator("#import").set_input_files({"name": "new.json", "mimeType": "application/json", "buffer": content})
+        page.locator("#import").set_input_files(
+            {"name": "new.json", "mimeType": "application/json", "buffer": content}
+        )
         expect(page.locator("#problem-title")).to_contain_text("new")
     else:
         page.locator("#view-problem").locator(how).click()

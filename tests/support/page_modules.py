@@ -22,7 +22,8 @@ def run_module(code: str, given: Any = None) -> Any:
     Parameters
     ----------
     code
-        Of an asynchronous function; ``load("formats.js")`` imports a module of the page, ``given`` is the argument.
+        Of an asynchronous function; ``load("formats.js")`` imports a module of the page, ``given`` is the
+        argument.
     given
         Anything that JSON can hold.
     """
