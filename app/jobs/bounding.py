@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from app.domain.problem import Problem
@@ -10,7 +9,7 @@ from app.solvers.bound.instance import new_instance
 from app.solvers.bound.upper_bound import gap, upper_bound
 from app.solvers.bound.visits import visit_bound
 from app.solvers.protocol import Proof, StopCriterion
-from app.solvers.stop import never
+from app.solvers.stop import Deadline, EarlierOf, never
 
 _LARGEST_SHARE = 1 / 3
 """Of the time limit of a request, kept for the bound; what the search leaves is the bound's too."""
@@ -47,8 +46,7 @@ def bound_answer(
     """
     if limit_s is None:
         return {"bound": None, "gap": None}
-    until = time.monotonic() + limit_s
-    found = upper_bound(problem, reward, lambda: time.monotonic() >= until or stop())
+    found = upper_bound(problem, reward, EarlierOf(stop, Deadline(limit_s)))
     # The units that the bound is computed in may round a reward that is reached away by a hair.
     bound = max(found.value, reward)
     return {"bound": bound, "gap": gap(bound, reward)}

@@ -61,8 +61,10 @@ class _StopInTime:
         self._context, self._reserve = context, reserve
 
     def __call__(self) -> bool:
+        """See :class:`~app.solvers.protocol.StopCriterion`."""
         return self._context.cancelled() or self.seconds_left() <= 0.0
 
     def seconds_left(self) -> float:
+        """Return the seconds left but for the reserve; infinity without a time limit."""
         left = self._context.time_left()
         return math.inf if left is None else left - self._reserve

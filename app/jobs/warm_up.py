@@ -23,7 +23,7 @@ from app.simulation.compilation import write_in_turns
 from app.simulation.generator import generate
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
-from app.solvers.stop import never
+from app.solvers.stop import Deadline, never
 
 # The learners are named, not imported, so that this room does not depend on them.
 _TRANSFER = "app.learning.universal.warm_up:warm_up"
@@ -80,7 +80,7 @@ def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | Non
         solver = create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE)
         for _ in range(2):
             begun = time.perf_counter()
-            solver.solve(large, 0, lambda: True, lambda _progress: None)
+            solver.solve(large, 0, Deadline(0.0), lambda _progress: None)
             overrun = time.perf_counter() - begun
         work.answer_time.overran(algorithm, large, overrun)
 

@@ -26,7 +26,7 @@ from app.solvers.protocol import (
     SourcePolicy,
     StopCriterion,
 )
-from app.solvers.stop import Deadline, seconds_left
+from app.solvers.stop import share_of_time
 
 _WORK_A_SECOND = 2e7
 """Of :func:`~app.learning.universal.effort.roll_out_work`, on one core; a guess, the deadline holds."""
@@ -66,14 +66,12 @@ class Auto:
         search, history = new_search(arrays), History()
         set_routes(search, greedy_plan(problem).as_array())
         moves, restarts = how_long(search, given.moves, given.restarts, stop)
-        left = seconds_left(stop)
-        policy = policy_pays(arrays, left) if given.policy is None else given.policy
+        policy = policy_pays(arrays, stop.seconds_left()) if given.policy is None else given.policy
         source = None
         if policy and self._context.library_url and not new_episodes(arrays, 1).done[0] and not stop():
             reward = float(search.best[0])
             report(Progress(0.0, 0, reward, Plan.of(actions_of(search), problem.n_targets)))
-            limit = stop if left is None else _Sooner(stop, _POLICY_SHARE * left)
-            found = self._policy_starts(problem, arrays, seed, limit)
+            found = self._policy_starts(problem, arrays, seed, share_of_time(stop, _POLICY_SHARE))
             if found is not None:
                 plans, source = found
                 _start_from_best(search, plans)
@@ -95,23 +93,12 @@ class Auto:
             return None
 
 
-class _Sooner:
-    """Stops when another criterion does, or after some seconds of its own."""
-
-    def __init__(self, other: StopCriterion, seconds: float) -> None:
-        self._other, self._own = other, Deadline(seconds)
-
-    def __call__(self) -> bool:
-        """See :class:`~app.solvers.protocol.StopCriterion`."""
-        return self._own() or self._other()
-
-
-def policy_pays(arrays: ProblemArrays, left: float | None) -> bool:
-    """Whether the policy's plans are worth their time: by size and the seconds left, None for no limit."""
+def policy_pays(arrays: ProblemArrays, left: float) -> bool:
+    """Whether the policy's plans are worth their time: by size and the seconds left."""
     work = roll_out_work(arrays)
     if work > _MOST_WORK:
         return False
-    return left is None or (left >= _LEAST_S and work / _WORK_A_SECOND <= _POLICY_SHARE * left)
+    return left >= _LEAST_S and work / _WORK_A_SECOND <= _POLICY_SHARE * left
 
 
 def _start_from_best(search: Search, plans: Integers) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from torch import nn
 
 from app.solvers.protocol import StopCriterion
-from app.solvers.stop import seconds_left
+from app.solvers.stop import Sooner
 
 _SECONDS_A_BYTE = 3e-8
 """For coding, the way to the service and its disk: with 39 MB the slowest of ten took about a second."""
@@ -13,7 +13,7 @@ _SECONDS_A_BYTE = 3e-8
 _LARGEST_SHARE = 0.25
 
 
-class TimeForCheckpoint:
+class TimeForCheckpoint(Sooner):
     """Stops before the given criterion does, by the time that a network's checkpoint takes.
 
     Where that would be a large part of the time limit, what could be learned in the rest is not worth it: the
@@ -34,17 +34,6 @@ class TimeForCheckpoint:
 
     def __init__(self, stop: StopCriterion, network: nn.Module) -> None:
         needed = _SECONDS_A_BYTE * sum(4 * parameter.numel() for parameter in network.parameters())
-        left = seconds_left(stop)
-        self.checkpoint = left is None or needed <= _LARGEST_SHARE * left
-        self._stop = stop
-        self._kept = needed if left is not None and self.checkpoint else 0.0
-
-    def __call__(self) -> bool:
-        """See :class:`~app.solvers.protocol.StopCriterion`."""
-        left = self.seconds_left()
-        return self._stop() or (left is not None and left <= 0.0)
-
-    def seconds_left(self) -> float | None:
-        """Return the seconds left for learning; None without a time limit."""
-        left = seconds_left(self._stop)
-        return None if left is None else left - self._kept
+        left = stop.seconds_left()
+        self.checkpoint = needed <= _LARGEST_SHARE * left
+        super().__init__(stop, needed if self.checkpoint else 0.0)

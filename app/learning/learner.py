@@ -14,7 +14,7 @@ from app.learning.functional_optimisers import RMSprop
 from app.learning.networks import ValueNetwork
 from app.learning.replay_buffer import Batch
 from app.solvers.protocol import StopCriterion
-from app.solvers.stop import never, seconds_left
+from app.solvers.stop import never
 
 _WORK_A_PART = 1_000_000
 """Numbers that one part of an update goes through, in and out of the network, about."""
@@ -113,8 +113,7 @@ class Learner:
         played = batch.filled.sum()
         begun = 0.0
         for part in _parts(batch):
-            left = seconds_left(stop)
-            if stop() or (left is not None and left < self._part_s):
+            if stop() or stop.seconds_left() < self._part_s:
                 return False
             begun = time.monotonic()
             loss = self.loss(part, played)

@@ -23,6 +23,7 @@ from app.learning.parameters import QmixParameters
 from app.learning.source_training import SEED, train_source
 from app.simulation.generator import generate
 from app.solvers.protocol import Progress
+from app.solvers.stop import WhenSet
 
 PAPER_SHAPES = tuple((m, n, 3) for m in (5, 10, 20) for n in (5, 10, 20, 30))
 """Sizes of section 5.2.4: UAVs, targets, materials."""
@@ -229,4 +230,4 @@ def _train_one(index: int, record: dict[str, Any], parameters: QmixParameters) -
     def report(progress: Progress) -> None:
         _shared["fractions"][index] = progress.fraction
 
-    return train_source(record, parameters, _shared["stopped"].is_set, report)
+    return train_source(record, parameters, WhenSet(_shared["stopped"]), report)

@@ -73,10 +73,21 @@ Report = Callable[[Progress], None]
 
 
 class StopCriterion(Protocol):
-    """Says when to end early. Asking does not change it, and costs little enough to ask every epoch."""
+    """Says when to end early, and how long that leaves.
+
+    Asking does not change it, and costs little enough to ask every epoch. :mod:`app.solvers.stop` has
+    criteria, and what puts one together from others.
+    """
 
     def __call__(self) -> bool:
         """Return True once the solver should return its incumbent."""
+        ...
+
+    def seconds_left(self) -> float:
+        """Return the seconds of the time limit that are left; infinity where there is none.
+
+        Once they are zero or less, calling it returns True.
+        """
         ...
 
 

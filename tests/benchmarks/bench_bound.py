@@ -36,7 +36,7 @@ from app.solvers.greedy import greedy_plan  # noqa: E402
 from app.solvers.local_search.solver import LocalSearch  # noqa: E402
 from app.solvers.parameters import ExactParameters, LocalSearchParameters  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
-from app.solvers.stop import never  # noqa: E402
+from app.solvers.stop import Deadline, never  # noqa: E402
 
 SIZES = ((5, 5), (5, 10), (10, 5), (10, 10))
 FAMILIES = ("uniform", "clustered", "deadline")
@@ -100,11 +100,10 @@ def _row(family: str, m: int, n: int, seed: int, seconds: float) -> tuple[float,
     search = LocalSearch(LocalSearchParameters(), SolverContext())
     reward = reward_of(problem, search.solve(problem, 1, never, lambda _told: None).plan)
     start = time.perf_counter()
-    bound = upper_bound(problem, reward, lambda: time.perf_counter() - start > seconds)
+    bound = upper_bound(problem, reward, Deadline(seconds))
     taken = time.perf_counter() - start
-    begun = time.perf_counter()
     solution = Exact(ExactParameters(), SolverContext()).solve(
-        problem, 1, lambda: time.perf_counter() - begun > seconds, lambda _told: None
+        problem, 1, Deadline(seconds), lambda _told: None
     )
     assert solution.proof is not None
     best = gap(solution.proof.bound, reward_of(problem, solution.plan)) or 0.0

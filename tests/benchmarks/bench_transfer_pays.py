@@ -29,9 +29,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-sys.path[:0] = [str(Path(__file__).parents[2])]
+sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "support")]
 
 from library_on_trial import library_of, policies_for_every_size  # noqa: E402
+from stopping import After  # noqa: E402
 
 from app.learning.parameters import QmixParameters, TransferQmixParameters  # noqa: E402
 from app.learning.qmix import Qmix  # noqa: E402
@@ -42,6 +43,7 @@ from app.simulation.explain import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.greedy import greedy_plan  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
+from app.solvers.stop import Deadline  # noqa: E402
 
 SIZES = ((5, 10), (7, 15), (10, 20))
 STREAM = 40_000_033
@@ -74,7 +76,7 @@ def run(number, method, seed, seconds, url):
     solution = solver_of(method, url).solve(
         problem,
         seed,
-        lambda: time.process_time() - start >= seconds,
+        Deadline(seconds, time.process_time),
         lambda p: told.append((time.process_time() - start, p.best_reward)),
     )
     floor = reward_of(problem, greedy_plan(problem))
@@ -95,8 +97,8 @@ def warm(method, url):
     if method in _warm:
         return
     _warm.add(method)
-    problem, left = generate("deadline", 3, 5, 3, np.random.default_rng(1)), iter(range(400))
-    solver_of(method, url).solve(problem, 1, lambda: next(left, None) is None, lambda _progress: None)
+    problem = generate("deadline", 3, 5, 3, np.random.default_rng(1))
+    solver_of(method, url).solve(problem, 1, After(400), lambda _progress: None)
 
 
 def reference(number):

@@ -3,6 +3,7 @@ import copy
 import numpy as np
 import pytest
 import torch
+from stopping import at_once
 
 from app.learning import learner as learner_module
 from app.learning.learner import Learner
@@ -187,7 +188,7 @@ def test_a_batch_in_parts_has_the_gradient_of_the_whole(network, batch, monkeypa
 def test_an_update_that_is_stopped_between_parts_changes_nothing(learner, batch, monkeypatch):
     monkeypatch.setattr(learner_module, "_WORK_A_PART", 1)
     before = [parameter.detach().clone() for parameter in learner.network.parameters()]
-    assert not learner.update(batch, lambda: True)
+    assert not learner.update(batch, at_once())
     assert learner.updates == 0
     for parameter, old in zip(learner.network.parameters(), before, strict=True):
         assert torch.equal(parameter, old)

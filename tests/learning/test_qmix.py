@@ -8,6 +8,7 @@ import torch
 from brute_force import best_reward
 from problems import random_problem
 from referee import replay
+from stopping import When
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.records import problem_to_record
@@ -53,7 +54,7 @@ def test_plans_are_legal_and_never_worse_than_none():
 def test_stop_from_the_beginning_returns_a_legal_plan_at_once():
     problem = generate("uniform", 5, 10, 3, np.random.default_rng(0))
     asked = []
-    solution = solve(problem, stop=lambda: asked.append(1) or True)
+    solution = solve(problem, stop=When(lambda: asked.append(1) or True))
     assert len(asked) == 1
     assert reward(problem, solution.plan) >= 0
     assert solution.history.epoch == [0]
@@ -83,10 +84,11 @@ from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
+from app.solvers.stop import never
 problem = generate("uniform", 4, 6, 3, np.random.default_rng(5))
 solution = Qmix(QmixParameters(
     mode="paper", n_epochs=60, learning_starts=20, evaluate_per_epoch=5), SolverContext()).solve(
-    problem, 123, lambda: False, lambda progress: None)
+    problem, 123, never, lambda progress: None)
 print(solution.plan.assignment, solution.history, hashlib.sha256(solution.checkpoint).hexdigest())
 """
 

@@ -1,6 +1,9 @@
+import math
+
 import numpy as np
 import pytest
 import torch
+from stopping import When, at_once
 
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
@@ -175,7 +178,7 @@ def test_best_plan_may_come_from_exploration(problem, network):
 
 
 def test_stopping_at_once_evaluates_and_returns_a_legal_plan(problem, network):
-    training, _ = train(problem, network, QmixParameters(), stop=lambda: True)
+    training, _ = train(problem, network, QmixParameters(), stop=at_once())
     assert training.epochs == 0
     assert training.history.epoch == [0]
     assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)
@@ -183,7 +186,9 @@ def test_stopping_at_once_evaluates_and_returns_a_legal_plan(problem, network):
 
 def test_stop_is_asked_before_every_epoch(problem, network):
     told = []
-    training, _ = train(problem, network, QmixParameters(), stop=lambda: len(told) == 7, report=told.append)
+    training, _ = train(
+        problem, network, QmixParameters(), stop=When(lambda: len(told) == 7), report=told.append
+    )
     assert training.epochs == 7
 
 
@@ -236,7 +241,7 @@ def test_stop_is_asked_within_an_epoch(problem, network):
         asked.append(len(asked))
         return len(asked) == 3
 
-    training, _ = train(problem, network, QmixParameters(), stop=stop)
+    training, _ = train(problem, network, QmixParameters(), stop=When(stop))
     assert len(asked) == 3
     assert (training.epochs, training.steps) == (0, 0)
     assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)
@@ -249,7 +254,7 @@ class OneQuestion:
         self.left = left
 
     def __call__(self):
-        return self.left is not None and self.left <= 0
+        return self.left <= 0
 
     def seconds_left(self):
         return self.left
@@ -261,6 +266,6 @@ def test_time_is_left_for_the_checkpoint_where_it_is_worth_it(network):
     # 1 to 100 MB a second.
     assert 1e-8 < needed / sum(4 * parameter.numel() for parameter in network.parameters()) < 1e-6
     assert (ample(), ample.checkpoint) == (False, True)
-    short, none = (TimeForCheckpoint(OneQuestion(s), network) for s in (2 * needed, None))
+    short, none = (TimeForCheckpoint(OneQuestion(s), network) for s in (2 * needed, math.inf))
     assert (short.checkpoint, short.seconds_left()) == (False, 2 * needed)
-    assert (none.checkpoint, none.seconds_left(), none()) == (True, None, False)
+    assert (none.checkpoint, none.seconds_left(), none()) == (True, math.inf, False)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 from referee import replay
+from stopping import at_once
 
 from app.domain.errors import InvalidParameters, NoCompatibleSource
 from app.domain.records import problem_to_record
@@ -118,7 +119,7 @@ def test_same_seed_same_answer(store):
 
 
 def test_stop_from_the_beginning_returns_the_sources_plan(store):
-    solution = transfer(store, task(45), stop=lambda: True)
+    solution = transfer(store, task(45), stop=at_once())
     assert solution.history.epoch == [0]
     rows = [list(row) for row in solution.plan.assignment]
     earned = replay(problem_to_record(task(45)), rows)["reward"]

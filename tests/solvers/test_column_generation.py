@@ -1,5 +1,6 @@
 """Column generation against brute force over all routes: the relaxation, the bound, and plans from them."""
 
+import math
 from dataclasses import replace
 from itertools import product
 
@@ -219,12 +220,12 @@ def test_a_combination_ends_when_it_is_told_to():
     problem = parcels(np.random.default_rng(23), m=6, n=40, latest=0.6)
     search = new_search(compile_problem(problem))
     looks = iter(range(1000))
-    combination = Combination([search], rounds=2, left=None)
+    combination = Combination([search], rounds=2, left=math.inf)
     combination.after_round(1, 2, lambda: next(looks) >= 3)
     asked = next(looks)
     assert 3 < asked < 40
     assert not combination.proven
-    whole = Combination([search], rounds=2, left=None)
+    whole = Combination([search], rounds=2, left=math.inf)
     whole.after_round(1, 2, lambda: next(looks, None) is None)
     assert next(looks) > 2 * asked
     assert search.best[0] > 0.0

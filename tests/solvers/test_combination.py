@@ -1,5 +1,6 @@
 """Routes of a search, combined: what is collected, and the choice among them, against brute force."""
 
+import math
 from dataclasses import replace
 from itertools import combinations
 
@@ -191,7 +192,7 @@ def test_combining_finds_a_plan_that_no_search_had():
     problem = parcels(np.random.default_rng(9), m=6, n=40, latest=0.6)
     searches = [collected(problem, seed, moves=800) for seed in range(4)]
     before = max(float(search.best[0]) for search in searches)
-    combination = Combination(searches, rounds=2, left=None)
+    combination = Combination(searches, rounds=2, left=math.inf)
     for search, filled in zip(combination.searches, searches, strict=True):
         pour(filled.pool, search.pool)
     assert combination.after_round(2, 2, never) == 2
@@ -209,7 +210,7 @@ def test_rounds_are_longer_where_plans_turn_out_to_have_many_visits():
     assert search.best_length.sum() > 60
     assert combination.after_round(1, 9, never) == 2
     assert combination.after_round(2, 2, never) == 2
-    assert Combination([search], rounds=9, left=None).after_round(1, 9, never) == 9
+    assert Combination([search], rounds=9, left=math.inf).after_round(1, 9, never) == 9
 
 
 def test_the_same_seed_and_threads_give_the_same_combined_plan():

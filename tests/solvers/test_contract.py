@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from problems import random_problem
 from referee import replay
+from stopping import at_once
 
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
@@ -124,7 +125,7 @@ def test_the_same_seed_gives_the_same_solution(name, context):
 @every_algorithm
 def test_stopped_at_once_it_still_answers(name, context):
     for problem in PROBLEMS:
-        plan = solve(name, problem, context, stop=lambda: True).plan
+        plan = solve(name, problem, context, stop=at_once()).plan
         assert replay(problem_to_record(problem), plan.assignment)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from brute_force import best_reward
 from problems import random_problem
+from stopping import After
 
 from app.domain.records import problem_to_record
 from app.simulation.explain import reward_of
@@ -54,7 +55,6 @@ def test_what_is_given_up_is_not_called_proven():
 
 def test_too_large_a_problem_is_answered_with_a_bound():
     problem = generate("uniform", 20, 70, 3, np.random.default_rng(1))
-    looks = iter(range(40))
-    solution = solve(problem, stop=lambda: next(looks, None) is None)
+    solution = solve(problem, stop=After(40))
     assert not solution.proof.proven
     assert solution.proof.bound >= reward_of(problem, solution.plan)

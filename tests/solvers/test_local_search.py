@@ -8,6 +8,7 @@ from brute_force import best_reward
 from brute_force_unloading import best_planned_reward
 from problems import random_problem
 from referee import replay
+from stopping import After
 
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
@@ -26,7 +27,7 @@ from app.solvers.local_search.routes import SATISFACTION, USELESS
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import SolverContext
-from app.solvers.stop import Deadline, never, seconds_left
+from app.solvers.stop import Deadline, never
 
 
 def quiet(*_told):
@@ -231,17 +232,11 @@ def test_where_nothing_can_be_earned_everybody_stays_at_home(change):
 
 def test_asking_the_stop_criterion_changes_nothing():
     problem = generate("uniform", 6, 9, 2, np.random.default_rng(8))
-    asked = 0
-
-    def counting():
-        nonlocal asked
-        asked += 1
-        return False
-
+    counting = After(10**9)
     first = solve(problem, moves=60_000, restarts=2)
     again = solve(problem, moves=60_000, restarts=2, stop=counting)
     assert (first.plan, first.history) == (again.plan, again.history)
-    assert asked > 15
+    assert counting.asked > 15
     assert first.history.epoch == [0, 1, 2, 3]
     assert first.history.reward == sorted(first.history.reward)
 
@@ -249,14 +244,7 @@ def test_asking_the_stop_criterion_changes_nothing():
 def test_stopped_in_the_middle_it_returns_what_it_has():
     problem = generate("uniform", 10, 20, 3, np.random.default_rng(9))
     for allowed in (0, 1, 5, 50):
-        left = allowed
-
-        def stop():
-            nonlocal left
-            left -= 1
-            return left < 0
-
-        solution = solve(problem, moves=10**9, stop=stop)
+        solution = solve(problem, moves=10**9, stop=After(allowed))
         earned = replay(problem_to_record(problem), [list(row) for row in solution.plan.assignment])["reward"]
         assert earned >= max(solution.history.reward) - 1e-9
         assert solution.history.epoch in ([0], [0, 1])
@@ -358,10 +346,3 @@ def test_a_search_is_cold_when_its_time_is_up(monkeypatch):
     assert temperatures[-1][1] == pytest.approx(cooling.cold * scale, rel=0.1)
     assert [progress.fraction for progress in told] == sorted(progress.fraction for progress in told)
     assert told[-1].fraction == 1.0
-
-
-def test_who_has_no_time_limit_says_nothing_of_time():
-    assert seconds_left(never) is None
-    assert seconds_left(lambda: False) is None
-    assert seconds_left(Deadline(float("inf"))) is None
-    assert seconds_left(Deadline(5, lambda: 1.0)) == 5.0

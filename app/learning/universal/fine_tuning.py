@@ -18,7 +18,6 @@ from app.learning.universal.unfolding import unfold
 from app.learning.universal.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays, stack
 from app.solvers.protocol import StopCriterion, none_spare
-from app.solvers.stop import seconds_left
 
 TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
@@ -130,11 +129,11 @@ class FineTuning:
 
     def _learn(self, plans: Integers, stop: StopCriterion, *, imitate: bool) -> None:
         """Take one step, unless its time is up, or would be before its end."""
-        begun, left = time.monotonic(), seconds_left(stop)
+        begun = time.monotonic()
         n = self._arrays.shape[1]
         visits_and_returns = int((plans < n).sum()) + plans.shape[0] * plans.shape[2]
         expected = self._time.expected(visits_and_returns, bootstrap=not imitate)
-        if stop() or (left is not None and expected > left):
+        if stop() or expected > stop.seconds_left():
             return
         problem = np.zeros(len(plans), np.int64)
         turns = unfold(self._arrays, problem, plans)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers
 from app.solvers.column_generation.packing import Packing, Relaxation
 from app.solvers.column_generation.pricing import Pricing
+from app.solvers.protocol import StopCriterion
 
 _CERTAIN = 0.9
 """Share from which on a route is fixed, if there are such; otherwise the one of the largest."""
@@ -22,7 +21,7 @@ def dive(
     pricing: Pricing,
     relaxed: Relaxation,
     best: float,
-    ended: Callable[[], bool],
+    ended: StopCriterion,
     rng: np.random.Generator | None = None,
 ) -> Integers | None:
     """Round a relaxation to a choice of routes.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from app.solvers.column_generation.labelling import (
 )
 from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost, worth
 from app.solvers.column_generation.pool import Pool
+from app.solvers.protocol import StopCriterion
 
 _ROOM = 40_000
 """Labels of one UAV in a search."""
@@ -96,7 +96,7 @@ class Pricing:
         """What no choice of whole routes exceeds, whether they are in the pool or not."""
 
     def close(
-        self, packing: Packing, best: float, ended: Callable[[], bool], thorough: bool = True
+        self, packing: Packing, best: float, ended: StopCriterion, thorough: bool = True
     ) -> Relaxation | None:
         """Add routes to the pool until its relaxation is that of all routes.
 
@@ -138,7 +138,7 @@ class Pricing:
         relaxed: Relaxation,
         promised: float,
         exact: bool,
-        ended: Callable[[], bool],
+        ended: StopCriterion,
     ) -> _Turn:
         """Ask for routes at the prices of a relaxation, and bound what any choice of routes earns."""
         made, grew, remembered, complete = 0, False, False, exact and not packing.fixed
@@ -168,9 +168,7 @@ class Pricing:
             self.bound = min(self.bound, bound)
         return _Turn(made, grew, remembered)
 
-    def _label(
-        self, means: Means, price: Floats, labels: Labels, exact: bool, ended: Callable[[], bool]
-    ) -> bool:
+    def _label(self, means: Means, price: Floats, labels: Labels, exact: bool, ended: StopCriterion) -> bool:
         """Make the labels of a UAV; whether they are all there are."""
         begin(self._ground, means, price, labels, exact)
         while labels.extended[0] < labels.size[0]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from app.solvers.column_generation.pricing import Pricing
 from app.solvers.local_search.annealing import Search, drop_useless, set_routes
 from app.solvers.local_search.effort import combined_round
 from app.solvers.protocol import StopCriterion
+from app.solvers.stop import Deadline, EarlierOf
 
 _PARTS, _PARTS_UNLIMITED = 3, 1
 """Parts of a search at whose ends its routes are combined, beside the end of its first round; the second
@@ -45,12 +47,13 @@ _WORTH_S = 0.1
 class Combination:
     """The pools of searches that run side by side, where combining their routes is worth its time."""
 
-    def __init__(self, searches: Sequence[Search], rounds: int, left: float | None) -> None:
-        """Prepare to combine the routes of several rounds, in a part of the seconds left, if it is known."""
+    def __init__(self, searches: Sequence[Search], rounds: int, left: float) -> None:
+        """Prepare to combine the routes of several rounds, in a part of the seconds left."""
         arrays = searches[0].arrays
-        time_enough = left is None or left >= _WORTH_S
+        time_enough = left >= _WORTH_S
         self._on = rounds > 1 and time_enough and often_whole(arrays)
-        self._left, self._begin, self._spent = left, time.monotonic(), 0.0
+        self._left, self._unlimited = left, math.isinf(left)
+        self._begin, self._spent = time.monotonic(), 0.0
         self.seconds = 0.0
         """How long before the end of the time the last round has to end."""
         self.proven = False
@@ -63,7 +66,7 @@ class Combination:
             self._pricing = Pricing(arrays, self.searches[0].pool)
             self._rng = np.random.default_rng(_SEED)
             self._always_whole = always_whole(arrays)
-            if left is not None:
+            if left < math.inf:
                 self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
 
     def after_round(self, ended: int, rounds: int, stop: StopCriterion) -> int:
@@ -87,32 +90,30 @@ class Combination:
         first, *others = self.searches
         for search in others:
             pour(search.pool, first.pool)
-        parts = _PARTS_UNLIMITED if self._left is None else _PARTS
+        parts = _PARTS_UNLIMITED if self._unlimited else _PARTS
         due = ended in {1, rounds} or ended % max(1, rounds // parts) == 0
         if due or (first.pool.size[0] > CAPACITY // 2 and self._affordable()):
             begin = time.monotonic()
             self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE), stop)
             self._spent += time.monotonic() - begin
-        if ended == 1 and self._left is not None:
+        if ended == 1 and not self._unlimited:
             longer = combined_round(int(first.best_length.sum())) / combined_round(self._visits)
             rounds = 1 + max(1, round((rounds - 1) / max(longer, 1.0)))
         return rounds
 
     def _affordable(self) -> bool:
         """Whether combinations have taken little of the time so far."""
-        return self._left is None or self._spent <= _OFTEN * (time.monotonic() - self._begin)
+        return self._unlimited or self._spent <= _OFTEN * (time.monotonic() - self._begin)
 
     def _until(self, begin: float, share: float) -> float:
         """Return when a combination has to end that begins now and may take a share of the time limit."""
-        if self._left is None:
-            return np.inf
         return min(begin + max(share * self._left, self.seconds), self._begin + self._left)
 
     def _combine(self, begin: float, until: float, stop: StopCriterion) -> None:
         """Ask for the routes that are missing, and make the best choice of routes the incumbent."""
 
-        def passed(share: float) -> Callable[[], bool]:
-            return lambda: stop() or time.monotonic() - begin >= share * (until - begin)
+        def passed(share: float) -> StopCriterion:
+            return EarlierOf(stop, Deadline(begin + share * (until - begin) - time.monotonic()))
 
         packing = Packing(self.searches[0].arrays, self.searches[0].pool, until)
         relaxed = self._pricing.close(packing, self._best(), passed(_PRICED))
@@ -128,10 +129,10 @@ class Combination:
                 self._thin(latest)
         self.proven = self._always_whole and self._pricing.bound < self._next()
 
-    def _dive_on(self, packing: Packing, relaxed: Relaxation, ended: Callable[[], bool]) -> Relaxation | None:
+    def _dive_on(self, packing: Packing, relaxed: Relaxation, ended: StopCriterion) -> Relaxation | None:
         """Dive some times more, each time elsewhere; return the relaxation after that."""
         found: Relaxation | None = relaxed
-        for _ in range(_DIVES_UNLIMITED if self._left is None else _DIVES):
+        for _ in range(_DIVES_UNLIMITED if self._unlimited else _DIVES):
             if found is None or ended() or found.reward < self._next():
                 break
             self._take(dive(packing, self._pricing, found, self._best(), ended, self._rng))

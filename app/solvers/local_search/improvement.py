@@ -7,6 +7,7 @@ the same generators give the same plans.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,6 @@ from app.solvers.local_search.annealing import Search, actions_of, anneal, drop_
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
-from app.solvers.stop import seconds_left
 
 _PIECE_S = 0.002
 """Seconds between two looks at the stop criterion, about."""
@@ -121,8 +121,8 @@ def improve_together(
         Told now and then, and after each round.
     """
     stop = stops[0]
-    begin, left = time.monotonic(), seconds_left(stop)
-    if left is not None:
+    begin, left = time.monotonic(), stop.seconds_left()
+    if left < math.inf:
         possible = left * moves_a_second(searches[0].arrays)
         rounds = rounds_for(rounds, possible / max(moves, 1))
     combination = Combination(searches, rounds, left)
@@ -135,7 +135,7 @@ def improve_together(
             now, end = time.monotonic(), np.inf
             count = moves * (number + 1) // rounds - tried
             if count > 0 and not idle:
-                if left is not None:
+                if left < math.inf:
                     end = now + (begin + left - combination.seconds - now) / (rounds - number)
                 span = _Span(count, now, end)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from app.domain.plan import Plan
@@ -13,7 +15,7 @@ from app.solvers.local_search.effort import default_moves, default_restarts, mov
 from app.solvers.local_search.improvement import Cooling, Watch, improve_together
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
-from app.solvers.stop import seconds_left
+from app.solvers.stop import WhileSpare
 
 
 class LocalSearch:
@@ -40,7 +42,7 @@ def how_long(search: Search, moves: int | None, restarts: int | None, stop: Stop
     """Fill in the moves and the restarts that a request leaves open, for a search from its current plan."""
     arrays = search.arrays
     if moves is None:
-        moves = default_moves(arrays) if seconds_left(stop) is None else moves_within_limit(arrays)
+        moves = default_moves(arrays) if math.isinf(stop.seconds_left()) else moves_within_limit(arrays)
     if restarts is None:
         restarts = default_restarts(arrays, moves, int(search.routes.length.sum()))
     return moves, restarts
@@ -60,23 +62,13 @@ def search_on(
     The same seed and number of threads give the same plan as long as `stop` does not end it early. Under a
     time limit there are more threads where cores are idle; they end when those are needed.
     """
-    spare = 0 if seconds_left(stop) is None else context.spare_threads()
-    stops = [stop] * context.threads + [_WhileSpare(stop, context, place) for place in range(1, spare + 1)]
+    spare = 0 if math.isinf(stop.seconds_left()) else context.spare_threads()
+    stops = [stop] * context.threads
+    stops += [WhileSpare(stop, context.spare_threads, place) for place in range(1, spare + 1)]
     streams = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(len(stops))
     searches = [search, *(replica(search) for _ in stops[1:])]
     generators = [np.random.default_rng(stream) for stream in streams]
     improve_together(searches, generators, stops, moves, rounds, Cooling(), watch)
-
-
-class _WhileSpare:
-    """Stops when another criterion does, or once there are fewer spare threads than before this one's."""
-
-    def __init__(self, other: StopCriterion, context: SolverContext, place: int) -> None:
-        self._other, self._context, self._place = other, context, place
-
-    def __call__(self) -> bool:
-        """See :class:`~app.solvers.protocol.StopCriterion`."""
-        return self._context.spare_threads() < self._place or self._other()
 
 
 def watching(search: Search, history: History, report: Report, begin: float = 0.0) -> Watch:

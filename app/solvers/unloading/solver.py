@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from app.simulation.simulator import ALLOWED, replay_delivering
 from app.simulation.unloading import best_deliveries
 from app.solvers.local_search.annealing import actions_of
 from app.solvers.protocol import History, Progress, Report, Solution, Solver, StopCriterion
-from app.solvers.stop import seconds_left
+from app.solvers.stop import share_of_time
 from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
 
 _ALGORITHM_SHARE = 0.6
@@ -69,29 +70,12 @@ class PlannedUnloading:
             fraction = _ALGORITHM_SHARE * progress.fraction
             report(Progress(fraction, progress.epoch, incumbent.reward, incumbent.plan))
 
-        solution = self.algorithm.solve(greedy, seed, _ShareOfTime(stop), told)
+        solution = self.algorithm.solve(greedy, seed, share_of_time(stop, _ALGORITHM_SHARE), told)
         incumbent.consider(solution.plan)
         history = History(list(solution.history.epoch), list(solution.history.reward))
         rng = np.random.default_rng([abs(seed), int(seed < 0), 1])
         _improve(incumbent, rng, stop, report, history)
         return replace(solution, plan=incumbent.plan, history=history)
-
-
-class _ShareOfTime:
-    """Stops when the given criterion does, or when the algorithm's share of the time limit is over."""
-
-    def __init__(self, stop: StopCriterion) -> None:
-        self._stop = stop
-        left = seconds_left(stop)
-        self._kept = None if left is None else (1 - _ALGORITHM_SHARE) * left
-
-    def __call__(self) -> bool:
-        left = self.seconds_left()
-        return self._stop() or (left is not None and left <= 0)
-
-    def seconds_left(self) -> float | None:
-        left = seconds_left(self._stop)
-        return None if left is None or self._kept is None else left - self._kept
 
 
 class _Incumbent:
@@ -151,7 +135,7 @@ def _improve(
     near, epoch = planned.search.near, history.epoch[-1] if history.epoch else 0
     possible = len(near.active) > 0 and len(near.wanted) > 0
     visits = arrays.shape[0] * int(arrays.max_steps[0])
-    moves, limit, heat = _MOVES_A_VISIT * visits, seconds_left(stop), 0.0
+    moves, limit, heat = _MOVES_A_VISIT * visits, stop.seconds_left(), 0.0
     for number in range(1, _ROUNDS + 1):
         while possible and not stop():
             share = _share_done(planned, moves, limit, stop) * _ROUNDS - (number - 1)
@@ -166,10 +150,9 @@ def _improve(
         report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
 
 
-def _share_done(planned: PlannedSearch, moves: int, limit: float | None, stop: StopCriterion) -> float:
+def _share_done(planned: PlannedSearch, moves: int, limit: float, stop: StopCriterion) -> float:
     """How much of the search is done: by moves, by work, or by the time limit, whichever is most."""
-    left = seconds_left(stop)
-    by_time = 0.0 if left is None or not limit else 1.0 - left / limit
+    by_time = 1.0 - stop.seconds_left() / limit if 0.0 < limit < math.inf else 0.0
     return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / _MOST_WORK, by_time))
 
 

@@ -5,6 +5,7 @@ import pytest
 import torch
 from problems import random_problem
 from referee import replay
+from stopping import After
 
 from app.domain.records import problem_to_record
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES
@@ -116,16 +117,10 @@ def test_stopped_episodes_end_at_home(policy, family_problems):
     problem = family_problems[0]
     arrays, whole = compile_problem(problem), None
     for allowed in (0, 1, 3, 8, 1000):
-        left = allowed
-
-        def stop():
-            nonlocal left
-            left -= 1
-            return left < 0
-
+        stop = After(allowed)
         played = play(policy.agent, arrays, np.zeros(1, np.int64), stop=stop)
         judged = replay(problem_to_record(problem), played.plans[0].tolist())
         assert played.rewards[0] == pytest.approx(judged["reward"])
         whole = played.plans
     assert np.array_equal(whole, play(policy.agent, arrays, np.zeros(1, np.int64)).plans)
-    assert left > 0
+    assert stop.left > 0

@@ -5,6 +5,7 @@ import copy
 import numpy as np
 import pytest
 import torch
+from stopping import After
 
 from app.learning.universal.curriculum import Shard
 from app.learning.universal.demonstrations import demonstrate
@@ -102,8 +103,8 @@ def test_an_update_that_is_stopped_changes_nothing(make_policy, batch, asked):
     policy = make_policy(5)
     learner = Learner(policy.agent, policy.mixer, lr=1e-2, td_weight=0.2)
     before = copy.deepcopy(learner.networks.state_dict())
-    answers = iter([False] * (asked - 1) + [True])
-    assert learner.update(batch, 1.0, imitate=True, bootstrap=True, stop=lambda: next(answers)) == {}
+    stop = After(asked - 1)
+    assert learner.update(batch, 1.0, imitate=True, bootstrap=True, stop=stop) == {}
     after = learner.networks.state_dict()
     assert all(torch.equal(after[name], tensor) for name, tensor in before.items())
-    assert next(answers, None) is None, "it went on after it was told to stop"
+    assert stop.asked == asked, "it went on after it was told to stop"

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from referee import replay
+from stopping import at_once
 
 from app.domain.records import problem_to_record
 from app.learning.universal import recombination
@@ -68,7 +69,7 @@ def test_routes_of_earlier_plans_are_used(policy):
         alone, after = BestPlan(arrays), BestPlan(arrays)
         Recombination(arrays, alone).consider(later, never)
         both = Recombination(arrays, after)
-        both.consider(earlier, lambda: True)
+        both.consider(earlier, at_once())
         both.consider(later, never)
         gained += after.reward - alone.reward
     assert gained > 0.05
@@ -80,7 +81,7 @@ def test_once_time_is_up_or_the_problem_is_too_large_the_best_plan_is_taken_as_i
     plans, single = episodes(policy, arrays, 16, 5), BestPlan(arrays)
     single.consider(plans)
     stopped, large = BestPlan(arrays), BestPlan(arrays)
-    Recombination(arrays, stopped).consider(plans, lambda: True)
+    Recombination(arrays, stopped).consider(plans, at_once())
     monkeypatch.setattr(recombination, "_WORK", 1.0)
     Recombination(arrays, large).consider(plans, never)
     for best in (stopped, large):

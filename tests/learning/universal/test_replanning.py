@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from referee import replay
+from stopping import at_once
 
 from app.domain.records import problem_to_record
 from app.learning.universal.replanning import groups_of, replan, residual_of, round_of
@@ -166,7 +167,7 @@ def test_once_time_is_up_the_others_fly_on(policy):
     problem = generate("uniform", 6, 9, 2, np.random.default_rng(80))
     arrays = compile_problem(problem)
     plan, reward = whole(problem)
-    plans = replan(policy.agent, arrays, plan, 8, np.random.default_rng(1), stop=lambda: True)
+    plans = replan(policy.agent, arrays, plan, 8, np.random.default_rng(1), stop=at_once())
     assert rewards_of(arrays, plans).reward[-1] == pytest.approx(reward)
 
 

@@ -8,6 +8,7 @@ import torch
 from brute_force import best_reward
 from problems import random_problem
 from referee import replay
+from stopping import After
 
 from app.domain.records import problem_to_record
 from app.learning.checkpoint import decode, verify
@@ -97,14 +98,7 @@ def test_stopped_at_any_time_it_returns_a_plan_and_a_checkpoint():
     problem = generate("uniform", 4, 7, 3, np.random.default_rng(45))
     floor = reward_of(problem, greedy_plan(problem))
     for allowed in (0, 1, 15, 60, 200):
-        left = allowed
-
-        def stop():
-            nonlocal left
-            left -= 1
-            return left < 0
-
-        solution = solve(problem, stop=stop, n_epochs=10**6)
+        solution = solve(problem, stop=After(allowed), n_epochs=10**6)
         assert reward_of(problem, solution.plan) >= floor - 1e-9
         assert solution.history.epoch[0] == 0
         verify(solution.checkpoint, problem)

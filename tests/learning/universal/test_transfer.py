@@ -8,6 +8,7 @@ import torch
 from problems import random_problem
 from referee import replay
 from sqlalchemy import text
+from stopping import After
 
 from app.domain.errors import InvalidParameters, NoCompatibleSource, ProblemTooLarge
 from app.domain.records import problem_to_record
@@ -210,14 +211,7 @@ def test_stopped_at_any_time_it_returns_a_plan(store):
     problem = generate("uniform", 8, 12, 2, np.random.default_rng(29))
     floor = reward_of(problem, greedy_plan(problem))
     for allowed in (0, 1, 10, 60, 200, 500):
-        left = allowed
-
-        def stop():
-            nonlocal left
-            left -= 1
-            return left < 0
-
-        solution = solve(store, problem, stop=stop, n_epochs=5, samples=20, polish_moves=10**9)
+        solution = solve(store, problem, stop=After(allowed), n_epochs=5, samples=20, polish_moves=10**9)
         assert reward_of(problem, solution.plan) >= floor - 1e-9
         assert solution.history.epoch[0] == 0
 
