@@ -8,13 +8,18 @@ from app.simulation.explain import reward_of
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree
-from app.solvers.bound.upper_bound import bound_without_sets, enumerate_sets
+from app.solvers.bound.upper_bound import bound_without_sets, enumerate_sets, sets_are_few
+from app.solvers.local_search.effort import default_moves
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
 from app.solvers.protocol import History, Progress, Proof, Report, Solution, SolverContext, StopCriterion
+from app.solvers.stop import share_of_time
 
 _SEARCH_SHARE = 0.1
-"""Of the progress bar, for the local search that finds the first incumbent."""
+"""Of the time limit, and of the progress bar, for the local search that finds the first incumbent."""
+
+_SEARCH_SHARE_LARGE = 0.6
+"""The same where target sets are too many, so that only the search makes the plan better."""
 
 
 class Exact:
@@ -30,15 +35,20 @@ class Exact:
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`; the solution has a proof."""
+        instance = new_instance(problem)
+        few = sets_are_few(instance)
+        share = _SEARCH_SHARE if few else _SEARCH_SHARE_LARGE
 
         def searching(progress: Progress) -> None:
-            report(Progress(_SEARCH_SHARE * progress.fraction, 0, progress.best_reward, progress.incumbent))
+            report(Progress(share * progress.fraction, 0, progress.best_reward, progress.incumbent))
 
-        plan = LocalSearch(LocalSearchParameters(), self._context).solve(problem, seed, stop, searching).plan
+        # With time to spare the proof is worth more than a longer search.
+        search = LocalSearchParameters(moves=default_moves(instance.arrays) if few else None)
+        limit = share_of_time(stop, share)
+        plan = LocalSearch(search, self._context).solve(problem, seed, limit, searching).plan
         reward = reward_of(problem, plan)
         history = History()
         history.add(0, reward)
-        instance = new_instance(problem)
         lower = reward / instance.scale
         sets = enumerate_sets(instance, stop)
         if sets is None:
@@ -54,8 +64,10 @@ class Exact:
                 earned = reward_of(problem, found)
                 if earned > reward:
                     plan, reward = found, earned
+                    # Also where the node could not be closed.
+                    tree.lower = max(tree.lower, earned / instance.scale)
                     history.add(tree.nodes, reward)
-            fraction = _SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * tree.nodes / most
+            fraction = share + (1.0 - share) * tree.nodes / most
             report(Progress(min(1.0, fraction), tree.nodes, reward, plan))
         if history.epoch[-1] < tree.nodes:
             history.add(tree.nodes, reward)

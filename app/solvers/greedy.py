@@ -1,4 +1,8 @@
-"""The greedy rule: every UAV in turn takes the visit that earns most at once. The yardstick of the others."""
+"""The greedy rule: every UAV in turn takes the visit that earns most at once. The yardstick of the others.
+
+Where the leg home costs reward, a visit is charged with what it makes that leg longer, or paid for what it
+makes it shorter. So no visit loses, and the plan never earns less than staying at home.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,25 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import Integers, ProblemArrays, compile_problem
+from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.explain import reward_of
-from app.simulation.simulator import ALLOWED, Episodes, act, compiled, end_step, leg_to, new_episodes, verdict
+from app.simulation.simulator import (
+    ALLOWED,
+    Episodes,
+    act,
+    compiled,
+    end_step,
+    leg_home,
+    leg_to,
+    new_episodes,
+    verdict,
+)
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.stop import never
+
+_ROUNDING = 1e-12
+"""Relative error that sums of amounts may have, and more."""
 
 _LOOKS = 400_000
 """Visits that are looked at between two looks at the stop criterion: a few milliseconds."""
@@ -47,9 +64,10 @@ def greedy_plan(problem: Problem, stop: StopCriterion = never) -> Plan:
     arrays = compile_problem(problem)
     actions = np.full((problem.max_steps, problem.n_uavs), problem.n_targets, np.int64)
     episodes, turn = new_episodes(arrays, 1), np.zeros(2, np.int64)
-    turns = max(1, _LOOKS // problem.n_targets)
+    left = arrays.need[0].sum(axis=1)
+    turns = max(1, _LOOKS // (problem.n_targets + 8 * problem.n_materials))
     while not episodes.done[0]:
-        _take_turns(arrays, episodes, actions, turn, turns)
+        _take_turns(arrays, episodes, actions, turn, left, turns)
         if stop():
             break
     return Plan.of(actions, problem.n_targets)
@@ -57,22 +75,20 @@ def greedy_plan(problem: Problem, stop: StopCriterion = never) -> Plan:
 
 @compiled
 def _take_turns(
-    arrays: ProblemArrays, episodes: Episodes, actions: Integers, turn: Integers, turns: int
+    arrays: ProblemArrays, episodes: Episodes, actions: Integers, turn: Integers, left: Floats, turns: int
 ) -> None:
     """Play some turns of the greedy rule in episode 0 and write its actions, (S, M), filled with N before.
 
-    `turn` has the step and the UAV whose turn is next.
+    `turn` has the step and the UAV whose turn is next, `left` the sum of what each target still needs, (N,).
     """
+    home = arrays.level.shape[1]
     for _ in range(turns):
         s, i = turn[0], turn[1]
-        best, chosen = 0.0, arrays.level.shape[1]
-        for j in range(arrays.level.shape[1]):
-            if verdict(arrays, episodes, 0, i, j) == ALLOWED:
-                earned = _earning(arrays, episodes, i, j)
-                if earned > best:
-                    best, chosen = earned, j
+        chosen = _best_visit(arrays, episodes, left, i)
         act(arrays, episodes, 0, i, chosen)
         actions[s, i] = chosen
+        if chosen < home:
+            left[chosen] = episodes.need[0, chosen].sum()
         turn[1] = i + 1
         if turn[1] == actions.shape[1]:
             turn[0], turn[1] = s + 1, 0
@@ -82,10 +98,30 @@ def _take_turns(
 
 
 @compiled
-def _earning(arrays: ProblemArrays, episodes: Episodes, i: int, j: int) -> float:
-    """What an allowed visit of UAV `i` to target `j` earns now (rule 5 of section 3)."""
-    unloaded = 0.0
-    for k in range(episodes.load.shape[2]):
-        unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
-    distance = leg_to(arrays, episodes, 0, i, j)
-    return arrays.level[0, j] * unloaded / arrays.need_total[0, j] - arrays.weight[0] * distance
+def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int) -> int:
+    """Return the target whose visit earns most for UAV `i` now; N where none earns anything."""
+    best, chosen = 0.0, arrays.level.shape[1]
+    if episodes.ret[0, i]:
+        return chosen
+    carried, weight = episodes.load[0, i].sum(), arrays.weight[0]
+    back = leg_home(arrays, episodes, 0, i) if arrays.charge_return[0] else 0.0
+    for j in range(arrays.level.shape[1]):
+        # What it earns at most is known at once, and mostly too little; the margin is for rounding errors.
+        most = min(carried, left[j]) * (1.0 + _ROUNDING)
+        if most <= 0.0:
+            continue
+        way = leg_to(arrays, episodes, 0, i, j)
+        if arrays.charge_return[0]:
+            way += arrays.home[0, i, j] - back
+        cost = weight * way
+        if arrays.level[0, j] * most / arrays.need_total[0, j] - cost <= best:
+            continue
+        if verdict(arrays, episodes, 0, i, j) != ALLOWED:
+            continue
+        unloaded = 0.0
+        for k in range(episodes.load.shape[2]):
+            unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
+        earned = arrays.level[0, j] * unloaded / arrays.need_total[0, j] - cost
+        if earned > best:
+            best, chosen = earned, j
+    return chosen

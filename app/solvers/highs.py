@@ -19,6 +19,10 @@ class QuietHighs(highspy.Highs):
         self.setOptionValue("output_flag", False)
         super().enableCallbacks()  # type: ignore[no-untyped-call]  # untyped in highspy
 
+    def limit(self, seconds: float) -> None:
+        """Limit the time of the next run; HiGHS's clock goes on from one run to the next."""
+        self.setOptionValue("time_limit", self.getRunTime() + max(0.0, seconds))
+
     def optimise(self) -> bool:
         """Run; whether an optimum was found.
 

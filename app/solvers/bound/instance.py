@@ -54,9 +54,16 @@ def new_instance(problem: Problem) -> Instance:
     price = float(arrays.weight[0]) / scale
     out = ~arrays.ret[0]
     charged = out & bool(arrays.charge_return[0])
-    useful = out[:, None] & ((load[:, None, :] > 0) & (need[None, :, :] > 0)).any(axis=2)
+    # As a product of matrices: with many materials much quicker than comparing each with each.
+    useful = out[:, None] & ((load > 0).astype(np.float32) @ (need > 0).astype(np.float32).T > 0)
     idle = np.where(charged, -price * arrays.start_home[0], 0.0)
     return Instance(arrays, scale, (level / scale)[:, None] * share, need, load, price, idle, useful)
+
+
+def ceiling(instance: Instance) -> float:
+    """Bound the reward of any plan, in the instance's scale, by what meeting every need would earn."""
+    most = float(instance.worth.sum())
+    return safely(most, most)
 
 
 def safely(value: float, magnitude: float) -> float:

@@ -20,6 +20,9 @@ from app.solvers.protocol import StopCriterion
 _MOST_ROUTES = 20_000
 """Routes of a UAV that are combined; a node with more is branched."""
 
+_MOST_ORDERS = 3_000_000
+"""Visits that are tried to find those routes; a node that would take more is branched."""
+
 _MOST_PLANS = 200_000
 """Steps of the enumeration after which a node is rather branched: some tenths of a second."""
 
@@ -41,7 +44,7 @@ class JointPlans:
         self._instance, self._sets, self._stop = instance, sets, stop
         self._episodes = new_episodes(instance.arrays, 1)
 
-    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002 - as whoever calls it has it
+    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002 - the signature is that of `Closing`
         """Fly all plans of the node; None if there are too many while something is left to ask."""
         arrays, m = self._instance.arrays, len(pools.sets)
         decided = all(len(pool) + int(idle) <= 1 for pool, idle in zip(pools.sets, pools.idle, strict=True))
@@ -96,7 +99,7 @@ class JointPlans:
             float(arrays.speed[0, i]),
             float(arrays.voyage[0, i]) * (1.0 + SLACK) - float(arrays.dis[0, i]),
             arrays.deadline[0] + SLACK * np.abs(arrays.deadline[0]), arrays.service[0],
-            bool(arrays.return_to_base[0]), bool(arrays.charge_return[0]), _MOST_ROUTES,
+            bool(arrays.return_to_base[0]), bool(arrays.charge_return[0]), _MOST_ROUTES, _MOST_ORDERS,
         )  # fmt: skip
         if len(length) >= _MOST_ROUTES:
             return None
@@ -133,8 +136,12 @@ def _orders(
     must_return: bool,
     charged: bool,
     most: int,
+    tries: int,
 ) -> tuple[Members, Integers, Floats]:
-    """Return the legal orders of a UAV's sets whose slack fits the room, `most` of them at most."""
+    """Return the legal orders of a UAV's sets whose slack fits the room; `most` where that is not all.
+
+    It is not all where there are more, or finding them takes more than so many `tries`.
+    """
     targets = np.zeros((most, longest), np.int16)
     length, loss = np.zeros(most, np.int64), np.zeros(most)
     found = 0
@@ -153,12 +160,16 @@ def _orders(
             t = order[depth] + 1
             while t < s:
                 if not used[t]:
+                    if tries == 0:
+                        return targets, length, loss
+                    tries -= 1
                     j = members[r, t]
                     d = start[j] if depth == 0 else between[members[r, order[depth - 1]], j]
                     way = flown[depth] + d
                     arrival = clock[depth] + d / speed
                     back = home[j] if must_return else 0.0
-                    if way + back <= reach and arrival <= latest[j] + 1e-12 * arrival:
+                    fits = slack[at] + price * way - cost[r] <= room + 1e-12 * (abs(room) + cost[r])
+                    if fits and way + back <= reach and arrival <= latest[j] + 1e-12 * arrival:
                         break
                 t += 1
             if t >= s:

@@ -10,6 +10,7 @@ import numpy as np
 from app.simulation.arrays import Flags, Floats
 from app.solvers.bound.instance import Instance
 from app.solvers.highs import QuietHighs
+from app.solvers.protocol import StopCriterion
 
 IDLE = -1
 """Route of a UAV that visits nothing."""
@@ -90,8 +91,9 @@ class Master:
         upper = np.where(allowed, highspy.kHighsInf, 0.0)
         self._program.changeColsBounds(count, np.arange(count, dtype=np.int32), np.zeros(count), upper)
 
-    def solve(self) -> MasterSolution | None:
-        """Solve; None where the columns allow no route to some UAV, or HiGHS finds no optimum."""
+    def solve(self, stop: StopCriterion) -> MasterSolution | None:
+        """Solve; None where the columns allow no route to some UAV, or HiGHS finds no optimum in time."""
+        self._program.limit(stop.seconds_left())
         if not self._program.optimise():
             return None
         solution = self._program.getSolution()

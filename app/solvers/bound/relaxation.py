@@ -24,6 +24,9 @@ _SMOOTHING = 0.6
 
 _MOST_COLUMNS = 4000
 
+_PIECE = 200_000
+"""Members of sets times materials that are priced between two looks at the stop criterion; milliseconds."""
+
 _TOLERANCE = 1e-7
 """Distance between master and bound, in the instance's scale, at which prices count as optimal."""
 
@@ -83,13 +86,21 @@ class Relaxation:
         """Return the pools at the root of the tree."""
         return Pools(tuple(np.arange(len(s.size)) for s in self.sets), (True,) * len(self.sets))
 
-    def price(self, pools: Pools, prices: Floats) -> Priced:
-        """Evaluate the relaxation at prices ≥ 0."""
+    def price(self, pools: Pools, prices: Floats, stop: StopCriterion) -> Priced | None:
+        """Evaluate the relaxation at prices ≥ 0; None if it was stopped."""
         instance = self.instance
         gain = instance.worth - prices
         values, best = [], np.where(pools.idle, instance.idle, -np.inf)
         for i, (own, pool) in enumerate(zip(self.sets, pools.sets, strict=True)):
-            value = price_sets(own.members, own.size, own.cost, pool, gain, instance.need, instance.load[i])
+            value = np.empty(len(pool))
+            piece = max(1, _PIECE // (own.members.shape[1] * instance.need.shape[1]))
+            for first in range(0, len(pool), piece):
+                if stop():
+                    return None
+                part = slice(first, first + piece)
+                value[part] = price_sets(
+                    own.members, own.size, own.cost, pool[part], gain, instance.need, instance.load[i]
+                )
             values.append(value)
             best[i] = max(best[i], value.max(initial=-np.inf))
         total = float(prices.sum()) + float(best.sum())
@@ -116,7 +127,7 @@ class Relaxation:
 
     def tighten(
         self, pools: Pools, prices: Floats, enough: float, stop: StopCriterion, near: float = 0.0
-    ) -> tuple[Priced, MasterSolution | None]:
+    ) -> tuple[Priced | None, MasterSolution | None]:
         """Find prices with a low bound, from given ones.
 
         Parameters
@@ -128,28 +139,31 @@ class Relaxation:
         enough
             A bound that is as good as any lower one.
         stop
-            Asked between rounds.
+            Asked every few milliseconds.
         near
             Share of the distance to `enough` by which the bound may stay above the lowest.
 
         Returns
         -------
         priced, solution
-            The lowest bound found; and the master's optimum if it has shown that no prices do much better.
+            The lowest bound found, None if it was stopped before there was any; and the master's optimum if
+            it has shown that no prices do much better.
         """
-        best = self.price(pools, prices)
-        if best.bound <= enough:
+        best = self.price(pools, prices, stop)
+        if best is None or best.bound <= enough:
             return best, None
         self._add_columns(pools, best, best.prices, None)
         smoothing = _SMOOTHING
         while best.bound > enough and not stop():
-            solution = self.master.solve()
+            solution = self.master.solve(stop)
             if solution is None:
                 return best, None
             if best.bound - solution.value <= max(_TOLERANCE, near * (best.bound - enough)):
                 return best, solution
             trial = smoothing * best.prices + (1.0 - smoothing) * solution.prices
-            priced = self.price(pools, trial)
+            priced = self.price(pools, trial, stop)
+            if priced is None:
+                return best, None
             added = self._add_columns(pools, priced, trial, solution)
             if priced.bound < best.bound:
                 best = priced

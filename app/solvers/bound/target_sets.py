@@ -17,6 +17,8 @@ from app.simulation.arrays import Floats, Integers
 from app.simulation.compilation import njit
 from app.simulation.simulator import TOLERANCE
 from app.solvers.bound.instance import Instance
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
 
 Members = npt.NDArray[np.int16]
 
@@ -57,8 +59,8 @@ def count_sets(instance: Instance) -> int:
     return total
 
 
-def sets_of(instance: Instance, i: int) -> TargetSets:
-    """Enumerate the sets of UAV `i`."""
+def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSets | None:
+    """Enumerate the sets of UAV `i`; None if it was stopped, which is asked before each size of sets."""
     arrays = instance.arrays
     targets = np.flatnonzero(instance.useful[i])
     n, longest = len(targets), min(len(targets), int(arrays.max_steps[0]))
@@ -67,8 +69,7 @@ def sets_of(instance: Instance, i: int) -> TargetSets:
             np.empty((0, 1), np.int16), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
         )
     binomial = np.array([[comb(a, b) for b in range(longest + 2)] for a in range(n + 1)], np.int64)
-    members, size, distance = _enumerate(
-        longest,
+    given = (
         binomial,
         np.ascontiguousarray(arrays.start_target[0, i, targets]),
         np.ascontiguousarray(arrays.between[0][np.ix_(targets, targets)]),
@@ -80,6 +81,18 @@ def sets_of(instance: Instance, i: int) -> TargetSets:
         bool(arrays.return_to_base[0]),
         bool(arrays.charge_return[0]),
     )
+    found: list[tuple[Members, Floats]] = []
+    way = np.zeros(1)
+    for s in range(1, longest + 1):
+        if stop():
+            return None
+        members, distance, way = _enumerate(s, way, *given)
+        found.append((members, distance))
+        if not len(distance):
+            break  # A legal route begins with one that has a visit less, so no larger set has any.
+    members = np.concatenate([np.pad(of, ((0, 0), (0, longest - of.shape[1]))) for of, _ in found])
+    size = np.repeat(np.arange(1, len(found) + 1), [len(of) for of, _ in found])
+    distance = np.concatenate([ways for _, ways in found])
     used = np.arange(longest)[None, :] < size[:, None]
     mask = (used * (np.int64(1) << targets)[members]).sum(axis=1)
     return TargetSets(targets.astype(np.int16)[members], size, mask, instance.price * distance)
@@ -87,7 +100,8 @@ def sets_of(instance: Instance, i: int) -> TargetSets:
 
 @njit(cache=True, error_model="numpy")
 def _enumerate(
-    longest: int,
+    s: int,
+    before: Floats,
     binomial: Integers,
     start: Floats,
     between: Floats,
@@ -98,64 +112,57 @@ def _enumerate(
     service: Floats,
     must_return: bool,
     charged: bool,
-) -> tuple[Members, Integers, Floats]:
-    """Go through the sets by size, and through those of a size in colexicographic order.
+) -> tuple[Members, Floats, Floats]:
+    """Go through the sets of size `s` in colexicographic order; return those with a legal route.
 
-    ``way[rank · s + p]`` is the shortest legal way over the set of that rank which ends at its member p.
+    The second is the length of the shortest one; in the third, ``way[rank · s + p]`` is the shortest legal
+    way over the set of that rank which ends at its member p. `before` is the same of the size below.
     """
     n = len(start)
-    total = 0
-    for s in range(1, longest + 1):
-        total += binomial[n, s]
-    members = np.zeros((total, longest), np.int16)
-    size = np.zeros(total, np.int64)
-    distance = np.zeros(total)
+    count = binomial[n, s]
+    members = np.zeros((count, s), np.int16)
+    distance = np.zeros(count)
     found = 0
-    before = np.zeros(1)
-    chosen = np.zeros(longest + 1, np.int64)
-    for s in range(1, longest + 1):
-        count = binomial[n, s]
-        way = np.full(count * s, np.inf)
+    chosen = np.zeros(s + 1, np.int64)
+    way = np.full(count * s, np.inf)
+    for t in range(s):
+        chosen[t] = t
+    for rank in range(count):
+        best = np.inf
+        served = 0.0
         for t in range(s):
-            chosen[t] = t
-        for rank in range(count):
-            best = np.inf
-            served = 0.0
-            for t in range(s):
-                served += service[chosen[t]]
-            for p in range(s):
-                j = chosen[p]
-                if s == 1:
-                    d = start[j]
-                else:
-                    rest = 0
-                    for t in range(p):
-                        rest += binomial[chosen[t], t + 1]
-                    for t in range(p + 1, s):
-                        rest += binomial[chosen[t], t]
-                    d = np.inf
-                    for q in range(s - 1):
-                        from_ = chosen[q] if q < p else chosen[q + 1]
-                        d = min(d, before[rest * (s - 1) + q] + between[from_, j])
-                if d == np.inf or d + (home[j] if must_return else 0.0) > reach:
+            served += service[chosen[t]]
+        for p in range(s):
+            j = chosen[p]
+            if s == 1:
+                d = start[j]
+            else:
+                rest = 0
+                for t in range(p):
+                    rest += binomial[chosen[t], t + 1]
+                for t in range(p + 1, s):
+                    rest += binomial[chosen[t], t]
+                d = np.inf
+                for q in range(s - 1):
+                    from_ = chosen[q] if q < p else chosen[q + 1]
+                    d = min(d, before[rest * (s - 1) + q] + between[from_, j])
+            if d == np.inf or d + (home[j] if must_return else 0.0) > reach:
+                continue
+            if latest[j] < np.inf:
+                arrival = d / speed + (served - service[j])
+                if arrival > latest[j] + 1e-12 * (arrival + served):
                     continue
-                if latest[j] < np.inf:
-                    arrival = d / speed + (served - service[j])
-                    if arrival > latest[j] + 1e-12 * (arrival + served):
-                        continue
-                way[rank * s + p] = d
-                best = min(best, d + (home[j] if charged else 0.0))
-            if best < np.inf:
-                size[found] = s
-                distance[found] = best
-                for t in range(s):
-                    members[found, t] = chosen[t]
-                found += 1
-            # The next set in colexicographic order.
-            t = 0
-            while t < s - 1 and chosen[t] + 1 == chosen[t + 1]:
-                chosen[t] = t
-                t += 1
-            chosen[t] += 1
-        before = way
-    return members[:found].copy(), size[:found].copy(), distance[:found].copy()
+            way[rank * s + p] = d
+            best = min(best, d + (home[j] if charged else 0.0))
+        if best < np.inf:
+            distance[found] = best
+            for t in range(s):
+                members[found, t] = chosen[t]
+            found += 1
+        # The next set in colexicographic order.
+        t = 0
+        while t < s - 1 and chosen[t] + 1 == chosen[t + 1]:
+            chosen[t] = t
+            t += 1
+        chosen[t] += 1
+    return members[:found].copy(), distance[:found].copy(), way

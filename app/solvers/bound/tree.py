@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from app.simulation.arrays import Flags, Floats
-from app.solvers.bound.instance import Instance
+from app.solvers.bound.instance import Instance, ceiling
 from app.solvers.bound.master import IDLE, MasterSolution
 from app.solvers.bound.relaxation import Pools, Priced, Relaxation
 from app.solvers.bound.target_sets import TargetSets
@@ -54,7 +54,7 @@ class Closing(Protocol):
         ...
 
 
-def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001 - as whoever calls it has it
+def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001 - the signature is that of `Closing`
     """Close a node in whose optimum every UAV flies one route: its value is reached by planned unloading."""
     if visits is None or _is_fractional(visits).any():
         return None
@@ -92,9 +92,8 @@ class Tree:
         self.nodes = 0
         self._closing = closing
         self._made = 0
-        root = self.relaxation.price(self.relaxation.all_pools(), np.zeros(instance.worth.shape))
         self._heap: list[tuple[float, int, Node]] = []
-        self._push(Node(self.relaxation.all_pools(), root.prices, root.bound))
+        self._push(Node(self.relaxation.all_pools(), np.zeros(instance.worth.shape), ceiling(instance)))
 
     @property
     def bound(self) -> float:
@@ -117,8 +116,12 @@ class Tree:
         relaxation.restrict(node.pools)
         enough = self.lower + PROVEN
         priced, solution = relaxation.tighten(node.pools, node.prices, enough, stop, _NEAR)
-        if solution is not None and not _is_fractional(self._visits(solution)).any():
-            priced, solution = relaxation.tighten(node.pools, priced.prices, enough, stop)
+        if priced is not None and solution is not None and not _is_fractional(self._visits(solution)).any():
+            closer, solution = relaxation.tighten(node.pools, priced.prices, enough, stop)
+            priced = priced if closer is None else closer
+        if priced is None:
+            self._push(node)
+            return
         bound = min(priced.bound, node.bound)
         if bound <= self.lower + PROVEN:
             return

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from app.domain.problem import Problem
-from app.solvers.bound.instance import Instance, new_instance
+from app.simulation.simulator import new_episodes
+from app.solvers.bound.instance import Instance, ceiling, new_instance
 from app.solvers.bound.target_sets import MAX_TARGETS, TargetSets, count_sets, sets_of
-from app.solvers.bound.tree import Tree
+from app.solvers.bound.tree import PROVEN, Tree
 from app.solvers.bound.visits import visit_bound
 from app.solvers.bound.whole_routes import route_bound
 from app.solvers.protocol import StopCriterion
@@ -45,20 +46,31 @@ def upper_bound(problem: Problem, reward: float | None, stop: StopCriterion) -> 
         What some plan earns, under either rule; parts of the search that cannot beat it are left out, so the
         bound is never below it. None: no plan is known but staying at home.
     stop
-        When true, the bound so far is returned. It is asked every few milliseconds on problems of the
-        paper's sizes; on larger ones a round of pricing is the longest time between two looks.
+        When true, the bound so far is returned. It is asked every few milliseconds, and HiGHS is told how
+        long it leaves.
     """
     instance = new_instance(problem)
     lower = float(instance.idle.sum())
     if reward is not None:
         lower = max(lower, reward / instance.scale)
+    if not instance.useful.any() or new_episodes(instance.arrays, 1).done[0]:
+        # No visit is allowed, so there is but one plan.
+        return UpperBound(float(instance.idle.sum()) * instance.scale, True)
     sets = enumerate_sets(instance, stop)
     if sets is None:
         value = bound_without_sets(instance, lower, stop)
-        return UpperBound(value * instance.scale, value <= lower)
-    tree = Tree(instance, sets, lower)
-    tree.run(stop)
-    return UpperBound(tree.bound * instance.scale, tree.proven and tree.attained)
+        tight = value <= lower
+    else:
+        tree = Tree(instance, sets, lower)
+        tree.run(stop)
+        value, tight = tree.bound, tree.proven and tree.attained
+    return UpperBound(_without_margin(instance, lower, value) * instance.scale, tight)
+
+
+def _without_margin(instance: Instance, lower: float, value: float) -> float:
+    """Leave a bound as it is, unless it is nothing but what was added for rounding errors."""
+    margin = 2.0 * (ceiling(instance) - float(instance.worth.sum()) + PROVEN)
+    return max(lower, 0.0) if value <= margin and abs(lower) <= margin else value
 
 
 def bound_without_sets(instance: Instance, lower: float, stop: StopCriterion) -> float:
@@ -78,25 +90,27 @@ def bound_without_sets(instance: Instance, lower: float, stop: StopCriterion) ->
     return max(lower, value)
 
 
+def sets_are_few(instance: Instance) -> bool:
+    """Say whether the target sets of all UAVs are few enough to be enumerated."""
+    return instance.need.shape[0] <= MAX_TARGETS and count_sets(instance) <= MOST_SETS
+
+
 def enumerate_sets(instance: Instance, stop: StopCriterion) -> tuple[TargetSets, ...] | None:
     """Enumerate the target sets of every UAV; None where there are too many of them or too little time."""
-    if instance.need.shape[0] > MAX_TARGETS or count_sets(instance) > MOST_SETS:
+    if not sets_are_few(instance):
         return None
     sets = []
     for i in range(len(instance.idle)):
-        if stop():
+        own = sets_of(instance, i, stop)
+        if own is None:
             return None
-        sets.append(sets_of(instance, i))
+        sets.append(own)
     return tuple(sets)
 
 
 def gap(bound: float, reward: float) -> float | None:
     """Return the share of the bound by which the reward may fall short of the best.
 
-    Where there is nothing to gain and nothing was gained, it is 0; None where it is not defined, because the
-    bound is not positive.
+    None where it is not defined, because the bound is not positive.
     """
-    missing = max(0.0, bound - reward)
-    if bound > 0:
-        return missing / bound
-    return 0.0 if missing <= 1e-9 * max(1.0, abs(bound)) else None
+    return max(0.0, bound - reward) / bound if bound > 0 else None

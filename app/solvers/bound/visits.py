@@ -12,7 +12,7 @@ import numpy as np
 from app.simulation.arrays import Floats
 from app.simulation.compilation import njit
 from app.simulation.simulator import TOLERANCE
-from app.solvers.bound.instance import Instance, safely
+from app.solvers.bound.instance import Instance, ceiling, safely
 from app.solvers.protocol import StopCriterion
 
 _ROUNDS = 3000
@@ -20,8 +20,8 @@ _PATIENCE = 20
 """Rounds without a lower bound after which steps become shorter."""
 
 _SHORTEST_STEP = 1e-3
-_PIECE = 50_000
-"""Pairs of UAV and target looked at between two looks at the stop criterion: some milliseconds."""
+_PIECE = 200_000
+"""Pairs of UAV and target, times materials, between two looks at the stop criterion: some milliseconds."""
 
 
 def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
@@ -36,11 +36,13 @@ def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
     stop
         Asked every few milliseconds; at first the bound is what meeting every need would earn.
     """
-    ceiling = safely(float(instance.worth.sum()), float(instance.worth.sum()))
+    most = ceiling(instance)
     if stop():
-        return ceiling
+        return most
     load = instance.load
     legs = _shortest_legs(instance)
+    if np.isinf(legs).all():
+        return float(instance.idle.sum())
     needs, loads = np.zeros(instance.need.shape), np.zeros(load.shape)
     best, best_prices = np.inf, (needs, loads)
     step, since = 1.0, 0
@@ -50,11 +52,11 @@ def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
         if total is None:
             break
         paid = float(needs.sum()) + float((loads * load).sum())
-        bound = safely(total + paid, abs(total) + 2.0 * paid + ceiling)
+        bound = safely(total + paid, abs(total) + 2.0 * paid + most)
         since = 0 if bound < best - 1e-6 * abs(bound) else since + 1
         if bound < best:
             best, best_prices = bound, (needs, loads)
-        if min(best, ceiling) <= lower or step < _SHORTEST_STEP:
+        if min(best, most) <= lower or step < _SHORTEST_STEP:
             break
         if since > _PATIENCE:
             step, since = step / 2, 0
@@ -71,7 +73,7 @@ def visit_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
         length = step * max(bound - lower, 1e-3 * abs(bound)) / norm
         needs = np.maximum(0.0, needs - length * down_needs)
         loads = np.maximum(0.0, loads - length * down_loads / whole)
-    return min(best, ceiling)
+    return min(best, most)
 
 
 def _earnings(
@@ -85,15 +87,15 @@ def _earnings(
 ) -> float | None:
     """Return what all UAVs earn at the prices, or None if there was no time to say."""
     m, n = legs.shape
-    piece = max(1, _PIECE // n)
-    most = int(instance.arrays.max_steps[0])
+    piece = max(1, _PIECE // (n * instance.need.shape[1]))
+    longest = int(instance.arrays.max_steps[0])
     total = 0.0
     for first in range(0, m, piece):
         if stop():
             return None
         last = min(first + piece, m)
         total += _evaluate(
-            first, last, most, legs, instance.worth, instance.need, instance.load, instance.idle,
+            first, last, longest, legs, instance.worth, instance.need, instance.load, instance.idle,
             needs, loads, met, used,
         )  # fmt: skip
     return total
@@ -102,15 +104,30 @@ def _earnings(
 def _shortest_legs(instance: Instance) -> Floats:
     """Return the least a visit costs, (M, N); infinite where it is not possible at all."""
     arrays = instance.arrays
-    n = arrays.level.shape[1]
-    apart = arrays.between[0] + np.where(np.eye(n, dtype=bool), np.inf, 0.0)
-    start, home = arrays.start_target[0], arrays.home[0]
-    legs = np.minimum(start, apart.min(axis=0, initial=np.inf)[None, :])
-    reach = arrays.dis[0][:, None] + start + (home if arrays.return_to_base[0] else 0.0)
+    legs = _nearest_legs(arrays.start_target[0], arrays.between[0])
+    reach = arrays.dis[0][:, None] + arrays.start_target[0]
+    if arrays.return_to_base[0]:
+        reach += arrays.home[0]
     possible = instance.useful & (reach <= arrays.voyage[0][:, None] * (1.0 + 2.0 * TOLERANCE))
     latest = arrays.deadline[0] + 2.0 * TOLERANCE * np.abs(arrays.deadline[0])
-    possible &= start / arrays.speed[0][:, None] * (1.0 - 1e-12) <= latest[None, :]
+    possible &= arrays.start_target[0] / arrays.speed[0][:, None] * (1.0 - 1e-12) <= latest[None, :]
     return np.where(possible, instance.price * legs, np.inf)
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_legs(start: Floats, between: Floats) -> Floats:
+    """Return the shortest leg that ends at a target and a UAV can fly: from its place or another target."""
+    m, n = start.shape
+    nearest = np.full(n, np.inf)
+    for j in range(n):
+        for k in range(n):
+            if k != j:
+                nearest[k] = min(nearest[k], between[j, k])
+    legs = np.empty((m, n))
+    for i in range(m):
+        for j in range(n):
+            legs[i, j] = min(start[i, j], nearest[j])
+    return legs
 
 
 @njit(cache=True, error_model="numpy")

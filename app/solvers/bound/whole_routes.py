@@ -25,13 +25,13 @@ def route_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
     lower
         Reward of a plan that is known, in the instance's scale.
     stop
-        Asked every few milliseconds, but not while HiGHS solves a relaxation.
+        Asked every few milliseconds; HiGHS is told how long it leaves.
     """
     arrays = instance.arrays
     if not always_whole(arrays):
         return np.inf
     pool = new_pool(arrays, 4 * CAPACITY)
     pricing = Pricing(arrays, pool, room=_ROOM, effort=np.inf, tolerance=2.0 * TOLERANCE)
-    pricing.close(Packing(arrays, pool), lower * instance.scale, stop)
+    pricing.close(Packing(arrays, pool, stop), lower * instance.scale, stop)
     bound = safely(pricing.bound, abs(pricing.bound) + float(worth(arrays).sum()))
     return reachable(arrays, bound) / instance.scale

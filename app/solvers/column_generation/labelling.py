@@ -21,9 +21,13 @@ from app.simulation.simulator import TOLERANCE, compiled, compiled_free
 from app.solvers.column_generation.packing import worth
 from app.solvers.column_generation.pool import Pool, collect
 from app.solvers.local_search.routes import NONE, lay
+from app.solvers.protocol import StopCriterion
 
 _MEMORY = 8
 """Targets whose visits are remembered at a target at first, itself among them."""
+
+_PIECE = 100_000
+"""Distances that are put in order between two looks at the stop criterion: some milliseconds."""
 
 _AS_MUCH = 1e-12
 """Relative difference that does not count when labels are compared: rounding."""
@@ -125,22 +129,32 @@ class Labels(NamedTuple):
     extended: Integers
 
 
-def ground_of(arrays: ProblemArrays) -> Ground:
-    """Measure the ground of the first problem of a stack."""
+def ground_of(arrays: ProblemArrays, stop: StopCriterion) -> Ground | None:
+    """Measure the ground of the first problem of a stack; None if it was stopped."""
     n = arrays.level.shape[1]
     leg = np.ascontiguousarray(arrays.between[0])
     size = min(_MEMORY, n)
     near = np.zeros((n, min(_MOST_MEMORY, n)), np.int64)
-    apart = leg + np.where(np.eye(n, dtype=bool), -np.inf, 0.0)
-    order = np.argsort(apart, axis=1, kind="stable")
+    order = np.empty((n, n), np.int64)
+    piece = max(1, _PIECE // n)
+    for top in range(0, n, piece):
+        if stop():
+            return None
+        rows = np.arange(top, min(top + piece, n))
+        apart = leg[rows]
+        apart[np.arange(len(rows)), rows] = -np.inf
+        order[rows] = np.argsort(apart, axis=1, kind="stable")
     near[:, :size] = order[:, :size]
     place = np.full((n, n), NONE, np.int8)
     place[near[:, :size], np.arange(n)[:, None]] = np.arange(size)[None, :]
     return Ground(leg, near, np.full(n, size), order, place)
 
 
-def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Means:
-    """Write down what UAV `i` has, leaving out what cannot run out; limits may be exceeded by a tolerance."""
+def means_of(arrays: ProblemArrays, i: int, needed: Floats, tolerance: float = TOLERANCE) -> Means:
+    """Write down what UAV `i` has, leaving out what cannot run out; limits may be exceeded by a tolerance.
+
+    `needed` are the :func:`~app.solvers.column_generation.pool.largest_needs`.
+    """
     speed, visits = float(arrays.speed[0, i]), min(int(arrays.max_steps[0]), arrays.level.shape[1])
     start, home, service = arrays.start_target[0, i], arrays.home[0, i], arrays.service[0]
     latest = arrays.deadline[0] + np.abs(arrays.deadline[0]) * tolerance
@@ -153,8 +167,8 @@ def means_of(arrays: ProblemArrays, i: int, tolerance: float = TOLERANCE) -> Mea
         rows.append((start, 1.0, np.zeros_like(start), reach))
     if np.isfinite(latest).any():
         rows.append((start / speed + service, 1.0 / speed, service, latest + service))
-    for need, load in zip(arrays.need[0].T, arrays.load[0, i], strict=True):
-        if np.sort(need)[::-1][:visits].sum() > load:
+    for need, load, most in zip(arrays.need[0].T, arrays.load[0, i], needed, strict=True):
+        if most > load:
             rows.append((need, 0.0, need, np.broadcast_to(load * (1.0 + tolerance), need.shape)))
     weight, nothing = float(arrays.weight[0]), _AS_MUCH * float(worth(arrays).max(initial=0.0))
     charged = weight if arrays.charge_return[0] else 0.0

@@ -15,7 +15,6 @@ shorter.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -25,6 +24,8 @@ import numpy as np
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.solvers.column_generation.pool import Pool
 from app.solvers.highs import QuietHighs
+from app.solvers.protocol import StopCriterion
+from app.solvers.stop import never
 
 _NODES = 100
 """Nodes of the tree in which HiGHS looks for the choice; most end at the first."""
@@ -69,8 +70,8 @@ class Relaxation(NamedTuple):
 class Packing:
     """The choice among the routes of a pool, which may grow meanwhile but not be thinned."""
 
-    def __init__(self, arrays: ProblemArrays, pool: Pool, until: float = math.inf) -> None:
-        """Prepare to relax and to choose until a time of :func:`time.monotonic`."""
+    def __init__(self, arrays: ProblemArrays, pool: Pool, until: StopCriterion = never) -> None:
+        """Prepare to relax and to choose within the time that a criterion leaves."""
         self._arrays, self._pool, self._until = arrays, pool, until
         self._idle = idle_cost(arrays)
         self._relaxation = QuietHighs(presolve="off", solver="simplex")
@@ -116,8 +117,8 @@ class Packing:
             len(row), start[:-1].astype(np.int32), row.astype(np.int32), value,
         )  # fmt: skip
         self._routes = size
-        # Its clock goes on from one time to the next. A relaxation that was cut short says nothing.
-        highs.setOptionValue("time_limit", highs.getRunTime() + self._left())
+        # A relaxation that was cut short says nothing.
+        highs.limit(self._until.seconds_left())
         if not highs.optimise():
             return None
         solution = highs.getSolution()
@@ -160,9 +161,8 @@ class Packing:
         program = self._program(useful)
         # Visits are whole numbers by themselves; told so, HiGHS sees that rewards may be counted in steps.
         program.integrality_ = [highspy.HighsVarType.kInteger] * (n + len(useful))
-        highs = QuietHighs(
-            presolve="off", mip_rel_gap=0.0, mip_max_nodes=_NODES, time_limit=_AHEAD * self._left()
-        )
+        highs = QuietHighs(presolve="off", mip_rel_gap=0.0, mip_max_nodes=_NODES)
+        highs.limit(_AHEAD * self._until.seconds_left())
         highs.passModel(program)
         optimal, info = highs.optimise(), highs.getInfo()
         # A choice is one even where a better one may exist.
@@ -171,10 +171,6 @@ class Packing:
         if -info.objective_function_value - float(self._idle.sum()) < least:
             return None
         return self.actions(useful[np.array(highs.getSolution().col_value)[n:] > 0.5])
-
-    def _left(self) -> float:
-        """Seconds."""
-        return max(0.0, self._until - time.monotonic())
 
     def _program(self, routes: Integers) -> highspy.HighsLp:
         """Write the program over some routes: columns are N targets, then these; rows are M kinds, N targets.

@@ -74,8 +74,12 @@ def often_whole(arrays: ProblemArrays) -> bool:
 
 def always_whole(arrays: ProblemArrays) -> bool:
     """Whether every route is whole: each UAV that flies carries enough for all that it can visit."""
-    needs = np.sort(arrays.need[0], axis=0)[::-1][: int(arrays.max_steps[0])].sum(axis=0)
-    return bool((arrays.load[0][~arrays.ret[0]] >= needs[None, :]).all())
+    return bool((arrays.load[0][~arrays.ret[0]] >= largest_needs(arrays)[None, :]).all())
+
+
+def largest_needs(arrays: ProblemArrays) -> Floats:
+    """(K,) the most that a UAV could unload of each material on a route of as many visits as there may be."""
+    return np.sort(arrays.need[0], axis=0)[::-1][: int(arrays.max_steps[0])].sum(axis=0)
 
 
 def new_pool(arrays: ProblemArrays, capacity: int = CAPACITY) -> Pool:
@@ -103,8 +107,9 @@ def _kinds(arrays: ProblemArrays) -> Integers:
             *(arrays.load[0], arrays.start_target[0], arrays.home[0]),
         ]
     )
-    _, first, kind = np.unique(told, axis=0, return_index=True, return_inverse=True)
-    return first[kind.ravel()].astype(np.int64)
+    first: dict[bytes, int] = {}
+    # Adding 0 makes one zero of the two.
+    return np.array([first.setdefault(row.tobytes(), i) for i, row in enumerate(told + 0.0)], np.int64)
 
 
 @compiled

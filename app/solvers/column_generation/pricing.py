@@ -9,6 +9,7 @@ import numpy as np
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import TOLERANCE
 from app.solvers.column_generation.labelling import (
+    Ground,
     Labels,
     Means,
     begin,
@@ -21,7 +22,7 @@ from app.solvers.column_generation.labelling import (
     values,
 )
 from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost, worth
-from app.solvers.column_generation.pool import Pool
+from app.solvers.column_generation.pool import Pool, largest_needs
 from app.solvers.protocol import StopCriterion
 
 _ROOM = 40_000
@@ -79,21 +80,36 @@ class Pricing:
             By what share of a limit it may be exceeded. More than the simulator's leaves room for rounding in
             the bound; routes that need it are not added.
         """
-        n, steps = arrays.level.shape[1], int(arrays.max_steps[0])
-        self._arrays, self._pool, self._ground = arrays, pool, ground_of(arrays)
-        kinds, number = np.unique(pool.kind[~arrays.ret[0]], return_counts=True)
-        self._kinds = [
-            (i, many, means_of(arrays, i, tolerance))
-            for i, many in zip(kinds.tolist(), number.tolist(), strict=True)
-        ]
-        resources = {len(means.rate) for _, _, means in self._kinds}
-        self._labels = {size: new_labels(n, size, room) for size in resources}
+        self._arrays, self._pool, self._room, self._tolerance = arrays, pool, room, tolerance
+        self._ground: Ground | None = None
+        self._kinds: list[tuple[int, int, Means]] = []
+        self._labels: dict[int, Labels] = {}
+        steps = int(arrays.max_steps[0])
         self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
         self._worth = worth(arrays)
         self._gain = _GAIN * float(self._worth.max(initial=0.0))
         self._idle, self._effort = idle_cost(arrays), effort
         self.bound = np.inf
         """What no choice of whole routes exceeds, whether they are in the pool or not."""
+
+    def _prepare(self, ended: StopCriterion) -> Ground | None:
+        """Measure what the labels need, once; None if there was no time."""
+        if self._ground is not None:
+            return self._ground
+        arrays = self._arrays
+        ground = ground_of(arrays, ended)
+        if ground is None:
+            return None
+        needed, prepared = largest_needs(arrays), []
+        kinds, number = np.unique(self._pool.kind[~arrays.ret[0]], return_counts=True)
+        for i, many in zip(kinds.tolist(), number.tolist(), strict=True):
+            if ended():
+                return None
+            prepared.append((i, many, means_of(arrays, i, needed, self._tolerance)))
+        resources = {len(means.rate) for _, _, means in prepared}
+        self._labels = {size: new_labels(arrays.shape[1], size, self._room) for size in resources}
+        self._kinds, self._ground = prepared, ground
+        return ground
 
     def close(
         self, packing: Packing, best: float, ended: StopCriterion, thorough: bool = True
@@ -114,13 +130,16 @@ class Pricing:
         Returns
         -------
         Relaxation or None
-            None where HiGHS finds no optimum in time.
+            None where HiGHS finds no optimum in time, or there is no time to begin.
         """
+        ground = self._prepare(ended)
+        if ground is None:
+            return None
         exact, effort = False, 0
         relaxed = packing.relax()
         while relaxed is not None and effort < self._effort and not ended():
             promised = max(0.0, relaxed.reward - packing.better_than(best))
-            turn = self._ask(packing, relaxed, promised, exact, ended)
+            turn = self._ask(ground, packing, relaxed, promised, exact, ended)
             effort += turn.labels
             if turn.grew:
                 relaxed, exact = packing.relax(), False
@@ -134,6 +153,7 @@ class Pricing:
 
     def _ask(
         self,
+        ground: Ground,
         packing: Packing,
         relaxed: Relaxation,
         promised: float,
@@ -148,7 +168,7 @@ class Pricing:
             if not spare[i]:
                 continue
             labels = self._labels[len(means.rate)]
-            complete &= self._label(means, relaxed.price, labels, exact, ended)
+            complete &= self._label(ground, means, relaxed.price, labels, exact, ended)
             made += int(labels.size[0])
             value, least = values(means, labels), relaxed.least[i]
             bound += many * max(value.max(initial=-np.inf), -self._idle[i])
@@ -159,7 +179,7 @@ class Pricing:
                 grew = True
             elif exact:
                 cycles = _most(value, least + self._gain, _CYCLES)
-                remembered |= remember(self._ground, labels, cycles) > 0
+                remembered |= remember(ground, labels, cycles) > 0
             if ended():
                 # The others come first next time.
                 self._kinds = self._kinds[asked:] + self._kinds[:asked]
@@ -168,11 +188,13 @@ class Pricing:
             self.bound = min(self.bound, bound)
         return _Turn(made, grew, remembered)
 
-    def _label(self, means: Means, price: Floats, labels: Labels, exact: bool, ended: StopCriterion) -> bool:
+    def _label(
+        self, ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool, ended: StopCriterion
+    ) -> bool:
         """Make the labels of a UAV; whether they are all there are."""
-        begin(self._ground, means, price, labels, exact)
+        begin(ground, means, price, labels, exact)
         while labels.extended[0] < labels.size[0]:
-            if ended() or not extend(self._ground, means, price, labels, exact, _PIECE):
+            if ended() or not extend(ground, means, price, labels, exact, _PIECE):
                 break
         return bool(labels.extended[0] == labels.size[0])
 

@@ -24,7 +24,8 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
     need = arrays.need[0][wanted]
     load = np.where(arrays.ret[0][:, None], 0.0, arrays.load[0])
     direct = _direct(arrays)[:, wanted]
-    served = np.stack([direct[amount > 0].any(axis=0) for amount in load.T], axis=1)
+    # As a product of matrices: with many materials much quicker than looking at each UAV's.
+    served = direct.T.astype(np.float32) @ (load > 0).astype(np.float32) > 0
     order = np.argsort(-worth, kind="stable")
     most = np.where(served, need, 0.0)[order]
     before = np.cumsum(most, axis=0) - most

@@ -94,7 +94,7 @@ class Combination:
         due = ended in {1, rounds} or ended % max(1, rounds // parts) == 0
         if due or (first.pool.size[0] > CAPACITY // 2 and self._affordable()):
             begin = time.monotonic()
-            self._combine(begin, self._until(begin, _FIRST_SHARE if ended == 1 else _SHARE), stop)
+            self._combine(self._seconds(begin, _FIRST_SHARE if ended == 1 else _SHARE), stop)
             self._spent += time.monotonic() - begin
         if ended == 1 and not self._unlimited:
             longer = combined_round(int(first.best_length.sum())) / combined_round(self._visits)
@@ -105,26 +105,26 @@ class Combination:
         """Whether combinations have taken little of the time so far."""
         return self._unlimited or self._spent <= _OFTEN * (time.monotonic() - self._begin)
 
-    def _until(self, begin: float, share: float) -> float:
-        """Return when a combination has to end that begins now and may take a share of the time limit."""
-        return min(begin + max(share * self._left, self.seconds), self._begin + self._left)
+    def _seconds(self, begin: float, share: float) -> float:
+        """Return how long a combination may take that begins now and may take a share of the time limit."""
+        return min(max(share * self._left, self.seconds), self._begin + self._left - begin)
 
-    def _combine(self, begin: float, until: float, stop: StopCriterion) -> None:
+    def _combine(self, seconds: float, stop: StopCriterion) -> None:
         """Ask for the routes that are missing, and make the best choice of routes the incumbent."""
 
-        def passed(share: float) -> StopCriterion:
-            return EarlierOf(stop, Deadline(begin + share * (until - begin) - time.monotonic()))
-
-        packing = Packing(self.searches[0].arrays, self.searches[0].pool, until)
-        relaxed = self._pricing.close(packing, self._best(), passed(_PRICED))
+        priced, dived, dived_on, ended = (
+            EarlierOf(stop, Deadline(share * seconds)) for share in (_PRICED, _DIVED, _DIVED_ON, 1.0)
+        )
+        packing = Packing(self.searches[0].arrays, self.searches[0].pool, ended)
+        relaxed = self._pricing.close(packing, self._best(), priced)
         if relaxed is not None:
-            self._take(dive(packing, self._pricing, relaxed, self._best(), passed(_DIVED)))
+            self._take(dive(packing, self._pricing, relaxed, self._best(), dived))
             relaxed = packing.relax()
         if relaxed is not None:
             if relaxed.price.any() and not stop():
                 # Where everything can be had, no route is better than another.
                 self._take(packing.choose(relaxed, self._best()))
-            latest = self._dive_on(packing, relaxed, passed(_DIVED_ON))
+            latest = self._dive_on(packing, relaxed, dived_on)
             if latest is not None:
                 self._thin(latest)
         self.proven = self._always_whole and self._pricing.bound < self._next()
