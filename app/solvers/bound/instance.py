@@ -8,6 +8,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
+from app.solvers.scale import largest_level
 
 
 class Instance(NamedTuple):
@@ -48,8 +49,7 @@ def new_instance(problem: Problem) -> Instance:
     arrays = compile_problem(problem)
     need, load, level = arrays.need[0], arrays.load[0], arrays.level[0]
     wanted = arrays.need_total[0] > 0
-    scale = float(level[wanted].max(initial=0.0))
-    scale = scale if scale > 0 else 1.0
+    scale = largest_level(arrays)
     share = need / np.where(wanted, arrays.need_total[0], 1.0)[:, None]
     price = float(arrays.weight[0]) / scale
     out = ~arrays.ret[0]

@@ -395,6 +395,6 @@ def collect_labels(
             if not again:
                 targets[kept] = targets[s]
                 kept += 1
-        flown[0], clock[0] = arrays.dis[0, i], 0.0
+        flown[0], clock[0] = 0.0, 0.0
         if lay(arrays, i, targets, kept, 0, flown, clock):
             collect(arrays, pool, i, targets, kept, flown)

@@ -25,6 +25,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.solvers.column_generation.pool import Pool
 from app.solvers.highs import QuietHighs
 from app.solvers.protocol import StopCriterion
+from app.solvers.scale import largest_level
 from app.solvers.stop import never
 
 _NODES = 100
@@ -74,6 +75,8 @@ class Packing:
         """Prepare to relax and to choose within the time that a criterion leaves."""
         self._arrays, self._pool, self._until = arrays, pool, until
         self._idle = idle_cost(arrays)
+        # HiGHS has absolute tolerances: it is told of rewards in largest levels.
+        self._unit = largest_level(arrays)
         self._relaxation = QuietHighs(presolve="off", solver="simplex")
         self._relaxation.passModel(self._program(np.arange(0)))
         self._routes = 0
@@ -123,10 +126,10 @@ class Packing:
             return None
         solution = highs.getSolution()
         # Rewards are maximised, so HiGHS's prices of the rows are negative.
-        dual = np.maximum(0.0, -np.array(solution.row_dual))
+        dual = self._unit * np.maximum(0.0, -np.array(solution.row_dual))
         return Relaxation(
-            reward=-highs.getInfo().objective_function_value - float(self._idle.sum()),
-            loss=np.maximum(0.0, np.array(solution.col_dual)[n:]),
+            reward=-self._unit * highs.getInfo().objective_function_value - float(self._idle.sum()),
+            loss=self._unit * np.maximum(0.0, np.array(solution.col_dual)[n:]),
             price=dual[m:],
             least=dual[:m][self._pool.kind] - self._idle,
             share=np.array(solution.col_value)[n:],
@@ -168,7 +171,7 @@ class Packing:
         # A choice is one even where a better one may exist.
         if not optimal and info.primal_solution_status != highspy.SolutionStatus.kSolutionStatusFeasible:
             return None
-        if -info.objective_function_value - float(self._idle.sum()) < least:
+        if -self._unit * info.objective_function_value - float(self._idle.sum()) < least:
             return None
         return self.actions(useful[np.array(highs.getSolution().col_value)[n:] > 0.5])
 
@@ -182,7 +185,7 @@ class Packing:
         room = np.bincount(self._pool.kind, minlength=m).astype(np.float64)
         program = highspy.HighsLp()
         program.num_col_, program.num_row_ = n + len(routes), m + n
-        program.col_cost_ = np.concatenate((-worth(self._arrays), self._costs(routes)))
+        program.col_cost_ = np.concatenate((-worth(self._arrays) / self._unit, self._costs(routes)))
         program.col_lower_, program.col_upper_ = np.zeros(n + len(routes)), np.ones(n + len(routes))
         program.row_lower_ = np.full(m + n, -highspy.kHighsInf)
         program.row_upper_ = np.concatenate((room, np.zeros(n)))
@@ -193,9 +196,9 @@ class Packing:
         return program
 
     def _costs(self, routes: Integers) -> Floats:
-        """Return what routes cost, over what their UAVs cost where they are."""
+        """Return what routes cost, in largest levels, over what their UAVs cost where they are."""
         distance, uav = self._pool.distance[routes], self._pool.uav[routes]
-        return self._arrays.weight[0] * distance - self._idle[uav]
+        return (self._arrays.weight[0] * distance - self._idle[uav]) / self._unit
 
     def _entries(self, routes: Integers) -> tuple[Integers, Integers, Floats]:
         """Return the entries of the columns of C routes: where each begins, (C + 1,), rows and values."""
@@ -244,8 +247,7 @@ def _steps(arrays: ProblemArrays) -> tuple[float, float]:
 
     Where distance is free, whole routes earn a sum of levels; most are written in steps of some size.
     """
-    levels = arrays.level[0][arrays.need_total[0] > 0]
-    largest = max(float(levels.max(initial=0.0)), 1e-300)
+    levels, largest = arrays.level[0][arrays.need_total[0] > 0], largest_level(arrays)
     grain = _common_measure(levels, 1e-9 * largest) if arrays.weight[0] == 0.0 else 0.0
     return largest, grain if grain >= _LEAST_GRAIN * largest else 0.0
 

@@ -24,6 +24,9 @@ from app.solvers.local_search.change import (
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
 from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
 
+ROUNDING = 1e-12
+"""Relative error that the totals of a plan may have after many changes, and more."""
+
 
 class Search(NamedTuple):
     """One search: its problem, its current plan, its incumbent.
@@ -120,7 +123,8 @@ def keep_best(search: Search) -> bool:
     """Make the current plan the incumbent if it is legal and better."""
     routes = search.routes
     reward = routes.total[SATISFACTION] - search.arrays.weight[0] * routes.total[DISTANCE]
-    if routes.total[USELESS] > 0.5 or reward <= search.best[0] + 1e-12:
+    rounding = ROUNDING * (routes.total[SATISFACTION] + search.arrays.weight[0] * routes.total[DISTANCE])
+    if routes.total[USELESS] > 0.5 or reward <= search.best[0] + rounding:
         return False
     search.best[0] = reward
     for i in range(routes.length.shape[0]):

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import ProblemArrays
 from app.solvers.local_search.annealing import Search, actions_of, anneal, drop_useless, set_routes
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
+from app.solvers.scale import common_level, largest_level
 
 _PIECE_S = 0.002
 """Seconds between two looks at the stop criterion, about."""
@@ -31,14 +31,16 @@ _COLLECTED_FROM = 0.3
 """Share of a round after which routes are good enough to be collected."""
 
 _FREE = 0.002
-"""Cost of a leg between neighbours, in largest levels, below which distance is as good as free."""
+"""Cost of a leg between neighbours, in common levels, below which distance is as good as free."""
 
 _FREE_HOT, _FREE_COLD = 0.3, 0.01
 """Temperatures there: rewards of plans lie further apart."""
 
 
 class Cooling(NamedTuple):
-    """Temperatures of a round and the price of a useless visit, in largest levels.
+    """Temperatures of a round and the price of a useless visit, in levels.
+
+    The hottest is in largest levels, the rest in common ones (:func:`~app.solvers.scale.common_level`).
 
     Attributes
     ----------
@@ -49,12 +51,15 @@ class Cooling(NamedTuple):
     guide
         What a leg between neighbours costs during the search where distance is as good as free; its time
         where there are deadlines, otherwise its distance.
+    far
+        What the way from the UAVs to the targets costs at most by that.
     """
 
     hot: float = 0.1
     cold: float = 0.005
     penalty: float = 0.03
     guide: float = 0.003
+    far: float = 0.05
 
 
 class _Span(NamedTuple):
@@ -166,21 +171,22 @@ def _round(
     tell: Callable[[float], None],
 ) -> None:
     """One round of one search; the plan at its end is made legal."""
-    scale = _level_scale(search.arrays)
+    # It begins where the largest levels are decided on, and ends where the common ones are.
+    largest, scale = largest_level(search.arrays), common_level(search.arrays)
     leg = _neighbour_leg(search)
     haste, thrift = 0.0, 0.0
     if float(search.arrays.weight[0]) * leg < _FREE * scale:
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
-        haste, thrift = _guides(search, cooling.guide * scale, leg)
+        haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
-    ratio = cooling.cold / cooling.hot
+    ratio = cooling.cold / cooling.hot * (scale / largest)
     done, share, told = 0, span.share(0), 0.0
     step = piece / span.moves
     while done < span.moves and share < 1.0 and not stop():
         count = min(piece, span.moves - done)
-        hot, cold = (cooling.hot * ratio**part for part in (share, min(share + step, 1.0)))
+        hot, cold = (cooling.hot * ratio**part * largest for part in (share, min(share + step, 1.0)))
         anneal(
-            search, rng, count, hot * scale, cold * scale, cooling.penalty * scale, haste, thrift,
+            search, rng, count, hot, cold, cooling.penalty * scale, haste, thrift,
             share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav),
         )  # fmt: skip
         done += count
@@ -216,18 +222,26 @@ def _neighbour_leg(search: Search) -> float:
     return float(legs.mean()) if legs.size else 0.0
 
 
-def _guides(search: Search, cost: float, leg: float) -> tuple[float, float]:
-    """Return what a unit of time and of distance costs, where a leg between neighbours is to cost so much."""
+def _guides(search: Search, cost: float, most: float, leg: float) -> tuple[float, float]:
+    """Return what a unit of time and of distance costs during the search.
+
+    Parameters
+    ----------
+    search
+        The search.
+    cost
+        What a leg between neighbours is to cost.
+    most
+        What the way from the UAVs to the targets may cost at most, in the mean: where targets lie close
+        together and far away, it is many times as long, and must not cost what a visit earns.
+    leg
+        Length of a leg between neighbours.
+    """
     arrays, near = search.arrays, search.near
     if leg == 0.0:
         return 0.0, 0.0
-    rate = cost / leg
+    far = float(arrays.start_target[0][np.ix_(near.active, near.wanted)].mean())
+    rate = min(cost / leg, most / far) if far > 0.0 else cost / leg
     if np.isfinite(arrays.deadline[0][near.wanted]).any():
         return rate * float(arrays.speed[0][near.active].mean()), 0.0
     return 0.0, max(0.0, rate - float(arrays.weight[0]))
-
-
-def _level_scale(arrays: ProblemArrays) -> float:
-    """Return the largest level of a target that needs anything; never 0."""
-    levels = arrays.level[0][arrays.need_total[0] > 0]
-    return max(float(levels.max(initial=0.0)), 1e-12)

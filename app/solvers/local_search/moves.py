@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Integers, ProblemArrays
+from app.simulation.arrays import Flags, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.solvers.local_search.change import Change, propose
 from app.solvers.local_search.routes import NONE, Routes
@@ -34,12 +34,15 @@ class Neighbourhood(NamedTuple):
         (N, L) the targets nearest to a target, itself left out.
     near_start
         (M, L) the targets nearest to where a UAV is.
+    reluctant
+        (M,) UAVs for which one visit alone, to some of these, earns less than its way costs.
     """
 
     active: Integers
     wanted: Integers
     near_target: Integers
     near_start: Integers
+    reluctant: Flags
 
 
 def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
@@ -48,11 +51,16 @@ def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     length = max(1, min(NEAR, len(wanted) - 1))
     between = arrays.between[0].copy()
     np.fill_diagonal(between, np.inf)
+    near_start = _nearest(arrays.start_target[0], wanted, length)
+    reluctant = np.zeros(len(near_start), np.bool_)
+    if len(wanted):
+        _find_reluctant(arrays, near_start, reluctant)
     return Neighbourhood(
         active=np.flatnonzero(~arrays.ret[0] & (arrays.load[0] > 0).any(axis=1)),
         wanted=wanted,
         near_target=_nearest(between, wanted, length),
-        near_start=_nearest(arrays.start_target[0], wanted, length),
+        near_start=near_start,
+        reluctant=reluctant,
     )
 
 
@@ -70,6 +78,25 @@ def _nearest(distance: np.ndarray, wanted: Integers, length: int) -> Integers:
 
 
 @compiled
+def _find_reluctant(arrays: ProblemArrays, near_start: Integers, reluctant: Flags) -> None:
+    """Work out :attr:`Neighbourhood.reluctant`, all False before."""
+    for i in range(len(near_start)):
+        for j in near_start[i]:
+            unloaded = 0.0
+            for k in range(arrays.load.shape[2]):
+                unloaded += min(arrays.load[0, i, k], arrays.need[0, j, k])
+            way = arrays.start_target[0, i, j]
+            if arrays.charge_return[0]:
+                way += arrays.home[0, i, j] - arrays.start_home[0, i]
+            if (
+                unloaded > 0.0
+                and arrays.level[0, j] * unloaded < arrays.weight[0] * way * arrays.need_total[0, j]
+            ):
+                reluctant[i] = True
+                break
+
+
+@compiled
 def draw(rng: np.random.Generator, n: int) -> int:
     """Draw a number from 0..n-1."""
     return int(rng.random() * n)
@@ -81,6 +108,8 @@ def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.rando
     change.uav[0], change.uav[1] = NONE, NONE
     i = near.active[draw(rng, len(near.active))]
     kind = rng.random()
+    if routes.length[i] == 0 and near.reluctant[i] and kind < 0.5:
+        return _depart(routes, near, change, rng, i)
     if routes.length[i] == 0 or kind < 0.15:
         return _insert(routes, near, change, rng, i)
     if kind < 0.25:
@@ -138,6 +167,20 @@ def _insert(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.
     for q in range(s + 1, new):
         change.target[0, q] = routes.target[i, q - 1]
     propose(routes, change, 0, i, s, new)
+    return True
+
+
+@compiled
+def _depart(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int) -> bool:
+    """A whole route for a UAV that has none: where one visit does not pay for the way, several may."""
+    length = 1 + draw(rng, routes.target.shape[1])
+    change.target[0, 0] = _target_after(routes, near, rng, i, 0)
+    for s in range(1, length):
+        u = rng.random()
+        change.target[0, s] = near.near_target[
+            change.target[0, s - 1], int(u * u * near.near_target.shape[1])
+        ]
+    propose(routes, change, 0, i, 0, length)
     return True
 
 

@@ -30,7 +30,7 @@ class Routes(NamedTuple):
     target, length
         (M, S) targets in order and (M,) visits of each route.
     flown, clock
-        (M, S+1) distance flown and time passed before each visit, and at the end.
+        (M, S+1) distance flown and time passed in the plan before each visit, and at the end.
     load, need
         (S*M, K) by slot: what the UAV carries and what the target needs just before the visit.
     earned
@@ -65,7 +65,7 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
     return Routes(
         target=np.zeros((m, steps), np.int64),
         length=np.zeros(m, np.int64),
-        flown=np.repeat(arrays.dis[0][:, None], steps + 1, axis=1),
+        flown=np.zeros((m, steps + 1)),
         clock=np.zeros((m, steps + 1)),
         load=np.zeros((slots, k)),
         need=np.zeros((slots, k)),
@@ -125,7 +125,7 @@ def lay(
     flown, clock
         (S+1,) overwritten from ``begin + 1`` on.
     """
-    limit = arrays.voyage[0, i] * (1.0 + TOLERANCE)
+    limit = arrays.voyage[0, i] * (1.0 + TOLERANCE) - arrays.dis[0, i]
     for s in range(begin, length):
         j = targets[s]
         leg = arrays.start_target[0, i, j] if s == 0 else arrays.between[0, targets[s - 1], j]
@@ -146,7 +146,7 @@ def lay(
 @compiled
 def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: int, flown: Floats) -> float:
     """Distance of a route as far as it costs reward."""
-    distance = flown[length] - arrays.dis[0, i]
+    distance = flown[length]
     if arrays.charge_return[0] and not arrays.ret[0, i]:
         distance += arrays.start_home[0, i] if length == 0 else arrays.home[0, i, targets[length - 1]]
     return distance

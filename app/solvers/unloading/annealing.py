@@ -15,7 +15,7 @@ from app.domain.plan import Actions
 from app.simulation.arrays import Floats, ProblemArrays
 from app.simulation.simulator import compiled, compiled_free
 from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve
-from app.solvers.local_search.annealing import Search, new_search, set_routes
+from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
 from app.solvers.local_search.change import Change, apply, extra_distance, feasible, undo
 from app.solvers.local_search.moves import draw_move
 from app.solvers.local_search.routes import DISTANCE, Routes
@@ -78,7 +78,8 @@ def keep_if_best(planned: PlannedSearch) -> None:
     """Make the current plan the incumbent if it is better."""
     search, routes = planned.search, planned.search.routes
     reward = planned.tally[SATISFACTION] - search.arrays.weight[0] * routes.total[DISTANCE]
-    if reward > search.best[0] + 1e-12:
+    rounding = ROUNDING * (planned.tally[SATISFACTION] + search.arrays.weight[0] * routes.total[DISTANCE])
+    if reward > search.best[0] + rounding:
         search.best[0] = reward
         for i in range(routes.length.shape[0]):
             search.best_length[i] = routes.length[i]

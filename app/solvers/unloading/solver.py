@@ -14,6 +14,7 @@ from app.simulation.simulator import ALLOWED, replay_delivering
 from app.simulation.unloading import best_deliveries
 from app.solvers.local_search.annealing import actions_of
 from app.solvers.protocol import History, Progress, Report, Solution, Solver, StopCriterion
+from app.solvers.scale import largest_level
 from app.solvers.stop import share_of_time
 from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
 
@@ -158,14 +159,8 @@ def _share_done(planned: PlannedSearch, moves: int, limit: float, stop: StopCrit
 
 def _piece(planned: PlannedSearch, rng: np.random.Generator, moves: int, heat: float, share: float) -> None:
     """Anneal for about 2 ms at the temperatures after a share of a round; `heat` 0 keeps to the lowest."""
-    scale = _level_scale(planned.search.arrays)
+    scale = largest_level(planned.search.arrays)
     length = max(1, moves // 200)
     after = min(1.0, share + length * _ROUNDS / moves)
     hot, cold = (_COLD * (_HOT / _COLD) ** (heat * (1 - at)) * scale for at in (share, after))
     anneal_planned(planned, rng, hot, cold, length, _PIECE_WORK)
-
-
-def _level_scale(arrays: ProblemArrays) -> float:
-    """Return the largest level of a target that needs anything; never 0."""
-    levels = arrays.level[0][arrays.need_total[0] > 0]
-    return max(float(levels.max(initial=0.0)), 1e-12)
