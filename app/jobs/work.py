@@ -62,7 +62,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     if limit.leaves_none_for(algorithm):
         return _at_once(problem, payload, limit, context)
     solver = create_solver(
-        algorithm, parse_parameters(algorithm, payload["parameters"]), _means(payload, context)
+        algorithm, parse_parameters(algorithm, payload["parameters"], stored=True), _means(payload, context)
     )
     solution = solver.solve(problem, seed, limit.searching, _report(context))
     limit.searched(algorithm)
@@ -94,7 +94,7 @@ def _at_once(problem: Problem, payload: dict[str, Any], limit: TimeLimit, contex
     """The greedy rule's plan, as far as it comes, in the name of the algorithm that was asked for."""
     greedy = create_solver("greedy", parse_parameters("greedy", {}), _means(payload, context))
     solution = greedy.solve(problem, payload["seed"], limit.bounding, _report(context))
-    asked = parse_parameters(payload["algorithm"], payload["parameters"])
+    asked = parse_parameters(payload["algorithm"], payload["parameters"], stored=True)
     return _result(problem, replace(solution, parameters=asked), payload, limit)
 
 

@@ -51,6 +51,7 @@ class QmixNetwork(nn.Module):
         generator: torch.Generator | None = None,
     ) -> None:
         super().__init__()
+        self.drqn_hidden_dim, self.qmix_hidden_dim = drqn_hidden_dim, qmix_hidden_dim
         self.agent = AgentNetwork(sizes, drqn_hidden_dim, generator)
         self.mixer = Mixer(sizes, qmix_hidden_dim, generator)
 

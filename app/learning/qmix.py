@@ -11,7 +11,7 @@ from app.learning.environment import SwarmEnvironment
 from app.learning.episode import Actor
 from app.learning.learner import Learner
 from app.learning.networks import QmixNetwork
-from app.learning.parameters import LearningParameters, QmixParameters
+from app.learning.parameters import LearningParameters, QmixParameters, TableParameters
 from app.learning.random_streams import RandomStreams, random_streams
 from app.learning.replay_buffer import ReplayBuffer
 from app.learning.threads import one_thread
@@ -49,7 +49,7 @@ def require_memory(
         )
 
 
-def qmix_config(problem: Problem, parameters: QmixParameters) -> QmixConfig:
+def qmix_config(problem: Problem, parameters: TableParameters) -> QmixConfig:
     """Return what fixes the networks' shapes."""
     return QmixConfig(
         problem.n_uavs,
@@ -63,12 +63,10 @@ def qmix_config(problem: Problem, parameters: QmixParameters) -> QmixConfig:
 def train(
     problem: Problem,
     network: QmixNetwork,
-    parameters: QmixParameters,
+    parameters: TableParameters,
     streams: RandomStreams,
     stop: StopCriterion,
     report: Report,
-    *,
-    count_updates: bool = False,
 ) -> Training:
     """Run Algorithm 1 from networks as they are; their weights are changed.
 
@@ -78,8 +76,6 @@ def train(
         As in :class:`~app.learning.trainer.Trainer`.
     network
         Networks for a problem of this size.
-    count_updates
-        Whether the target network's period is counted in updates too.
     """
     sizes = SwarmEnvironment(problem).sizes
     trainer = Trainer(
@@ -89,7 +85,6 @@ def train(
         buffer=ReplayBuffer(parameters.buffer_size, sizes, problem.max_steps),
         parameters=parameters,
         streams=streams,
-        count_updates=count_updates,
     )
     return trainer.run(Incumbent.empty(problem), stop, report)
 
@@ -133,20 +128,19 @@ class Qmix:
             If training would not fit into memory.
         """
         parameters = self._parameters
-        if parameters.mode == "service":
-            if fits(compile_problem(problem)):
-                with one_thread():
-                    return UniversalScratch(problem, parameters, seed, stop, report).run()
-            parameters = parameters.model_copy(update={"mode": "paper"})
-        config = qmix_config(problem, parameters)
-        require_memory(parameters, config.sizes, problem.max_steps, parameters.drqn_hidden_dim)
+        if parameters.mode == "service" and fits(compile_problem(problem)):
+            with one_thread():
+                return UniversalScratch(problem, parameters, seed, stop, report).run()
+        table, used = parameters.table(), parameters.in_paper()
+        config = qmix_config(problem, table)
+        require_memory(table, config.sizes, problem.max_steps, table.drqn_hidden_dim)
         streams = random_streams(seed)
         with one_thread():
             network = QmixNetwork(
-                config.sizes, parameters.drqn_hidden_dim, parameters.qmix_hidden_dim, streams.initialisation
+                config.sizes, table.drqn_hidden_dim, table.qmix_hidden_dim, streams.initialisation
             )
             in_time = TimeForCheckpoint(stop, network)
-            training = train(problem, network, parameters, streams, in_time, report)
+            training = train(problem, network, table, streams, in_time, report)
             checkpoint = (
                 encode(
                     network,
@@ -154,10 +148,10 @@ class Qmix:
                     task=problem,
                     algorithm="qmix",
                     seed=seed,
-                    parameters=parameters,
+                    parameters=used,
                     metrics=metrics_of(training),
                 )
                 if in_time.checkpoint
                 else None
             )
-        return Solution(training.incumbent.plan, training.history, parameters, checkpoint=checkpoint)
+        return Solution(training.incumbent.plan, training.history, used, checkpoint=checkpoint)

@@ -117,7 +117,8 @@ class SourcePolicies:
         config
             Shape of the networks of a policy for one size.
         any_size
-            Whether a policy for every size may be asked for too; its distance is that of the summaries.
+            Whether a policy for every size may be asked for too, whose distance is that of the summaries, and
+            one for this size whatever its hidden units.
 
         Raises
         ------
@@ -138,7 +139,8 @@ class SourcePolicies:
                 )
             return _source(library, policy, _distance(vectors[SUMMARY_SPACE], task_summary(problem)))
         space = description_space(problem)
-        fits = policy.architecture == QMIX_PAPER_1 and policy.metadata.get("config") == config.as_record()
+        same = any_size or policy.metadata.get("config") == config.as_record()
+        fits = policy.architecture == QMIX_PAPER_1 and _size(policy) == _size(problem) and same
         if not fits or space not in vectors:
             raise _bad_source(
                 f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "

@@ -69,8 +69,6 @@ class Trainer:
         The schedule.
     streams
         Random numbers; the evaluations draw none.
-    count_updates
-        Whether the target network is copied every `update_target_params` updates as well as epochs.
     """
 
     def __init__(
@@ -82,7 +80,6 @@ class Trainer:
         buffer: ReplayBuffer,
         parameters: LearningParameters,
         streams: RandomStreams,
-        count_updates: bool = False,
     ) -> None:
         self._explorer = explorer
         self._evaluator = evaluator
@@ -90,7 +87,6 @@ class Trainer:
         self._buffer = buffer
         self._parameters = parameters
         self._streams = streams
-        self._count_updates = count_updates
         self._schedule = EpsilonSchedule(
             parameters.epsilon_start, parameters.epsilon_end, parameters.epsilon_anneal_steps
         )
@@ -135,15 +131,13 @@ class Trainer:
         self._consider(record, training)
         self._buffer.add(record)
         learner, period = self._learner, self._parameters.update_target_params
-        copy_target = epoch % period == 0
         if len(self._buffer) >= self._parameters.first_update:
             if stop():
                 return False
             batch = self._buffer.sample(self._parameters.batch_size, self._streams.replay)
             if not learner.update(batch, stop):
                 return False
-            copy_target |= self._count_updates and learner.updates % period == 0
-        if copy_target:
+        if epoch % period == 0:
             learner.update_target()
         return True
 

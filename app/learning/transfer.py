@@ -64,7 +64,7 @@ class TransferQmix:
             If fine-tuning would not fit into memory.
         """
         parameters, policies = self._parameters, SourcePolicies(self._context.library_url)
-        config = qmix_config(problem, parameters.table_3())
+        config = qmix_config(problem, parameters.table())
         with one_thread():
             if parameters.mode == "paper":
                 if parameters.source is None:
@@ -95,13 +95,14 @@ def _fine_tune(
     report: Report,
 ) -> Solution:
     """Line 7 of Algorithm 2: copy the parameters of the source task, then Algorithm 1."""
-    used = parameters.table_3()
+    network = copy.deepcopy(cast(QmixNetwork, source.network))
+    hidden = {name: getattr(network, name) for name in ("drqn_hidden_dim", "qmix_hidden_dim")}
+    used = parameters.table().model_copy(update=hidden)
     config = qmix_config(problem, used)
     require_memory(used, config.sizes, problem.max_steps, used.drqn_hidden_dim)
-    network = copy.deepcopy(cast(QmixNetwork, source.network))
     in_time = TimeForCheckpoint(stop, network)
-    training = train(problem, network, used, random_streams(seed), in_time, report, count_updates=True)
-    parameters = parameters.model_copy(update={"n_epochs": used.n_epochs})
+    training = train(problem, network, used, random_streams(seed), in_time, report)
+    parameters = parameters.model_copy(update=used.model_dump())
     learned = (
         encode(
             network,
@@ -128,13 +129,15 @@ def _fine_tune_and_polish(
 ) -> Solution:
     """Service mode from a policy for one size: fine-tuned the paper's way, polished as any other."""
     arrays = compile_problem(problem)
-    used = fill_in(parameters.model_copy(update={"samples": 0, "replans": 0}), effort(arrays))
+    # One roll-out in one order, then the paper's updates: nothing of service mode's own.
+    used = fill_in(parameters.model_copy(update={"orders": 1, "samples": 0, "replans": 0}), effort(arrays))
+    paper = used.parameters.model_copy(update=dict.fromkeys(parameters.fixed_in_service))
     share = _TUNING_SHARE if used.polish_moves else 1.0
 
     def tell(progress: Progress) -> None:
         report(Progress(share * progress.fraction, progress.epoch, progress.best_reward, progress.incumbent))
 
-    tuned = _fine_tune(problem, source, used.parameters, seed, stop, tell)
+    tuned = _fine_tune(problem, source, paper, seed, stop, tell)
     best = BestPlan(arrays)
     best.consider(tuned.plan.as_array()[None])
     if not used.is_bare:
@@ -149,4 +152,4 @@ def _fine_tune_and_polish(
         lambda done: report(Progress(share + (1 - share) * done, epochs, best.reward, best.plan)),
     )
     learned = tuned.checkpoint if used.n_epochs else None
-    return Solution(best.plan, tuned.history, used.parameters, source.policy, learned)
+    return Solution(best.plan, tuned.history, tuned.parameters, source.policy, learned)

@@ -15,6 +15,9 @@ from pydantic import BaseModel, ConfigDict
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 
+STORED = "stored"
+"""Key of the validation's context that is true where parameters come from what a version before stored."""
+
 
 class Parameters(BaseModel):
     """Base of every algorithm's parameters: frozen, strict, nothing unknown, every field described."""

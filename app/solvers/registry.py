@@ -14,7 +14,7 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
-from app.solvers.protocol import Parameters, Solver, SolverContext
+from app.solvers.protocol import STORED, Parameters, Solver, SolverContext
 
 _PLANNED_UNLOADING = "app.solvers.unloading.solver:PlannedUnloading"
 """Lends every algorithm the unloading that is planned."""
@@ -123,18 +123,29 @@ def algorithm(name: str) -> Algorithm:
     return found
 
 
-def parse_parameters(name: str, given: Mapping[str, Any]) -> Parameters:
+def parse_parameters(name: str, given: Mapping[str, Any], *, stored: bool = False) -> Parameters:
     """Check an algorithm's parameters and fill in the defaults.
+
+    Parameters
+    ----------
+    name
+        The algorithm.
+    given
+        Its parameters.
+    stored
+        Whether they come from a job, maybe of an earlier version, instead of from a request: then what their
+        mode has no use for is left out, not refused.
 
     Raises
     ------
     UnknownAlgorithm
         If there is no such algorithm.
     InvalidParameters
-        If a parameter is unknown or out of range; violations point into ``/parameters``.
+        If a parameter is unknown, out of range or of no use to the mode; violations point into
+        ``/parameters``.
     """
     try:
-        return algorithm(name).parameter_model().model_validate(dict(given))
+        return algorithm(name).parameter_model().model_validate(dict(given), context={STORED: stored})
     except ValidationError as error:
         violations = [
             Violation("/".join(("/parameters", *map(str, e["loc"]))), e["msg"])

@@ -11,7 +11,7 @@ from app.learning.checkpoint_time import TimeForCheckpoint
 from app.learning.environment import SwarmEnvironment
 from app.learning.episode import Actor
 from app.learning.learner import Learner
-from app.learning.parameters import QmixParameters, TransferQmixParameters
+from app.learning.parameters import TableParameters, TransferQmixParameters
 from app.learning.random_streams import random_streams
 from app.learning.replay_buffer import ReplayBuffer
 from app.learning.trainer import Incumbent, Trainer
@@ -38,7 +38,7 @@ class Recorder:
         self._learner.update_target()
 
 
-def train(problem, network, parameters, *, calls=None, seed=1, stop=never, report=None, count_updates=False):
+def train(problem, network, parameters, *, calls=None, seed=1, stop=never, report=None):
     streams = random_streams(seed)
     environment = SwarmEnvironment(problem)
     learner = Learner(network, parameters.lr, parameters.gamma, parameters.grad_norm_clip)
@@ -49,7 +49,6 @@ def train(problem, network, parameters, *, calls=None, seed=1, stop=never, repor
         buffer=ReplayBuffer(parameters.buffer_size, environment.sizes, problem.max_steps),
         parameters=parameters,
         streams=streams,
-        count_updates=count_updates,
     )
     return trainer.run(Incumbent.empty(problem), stop, report or (lambda progress: None)), streams
 
@@ -64,7 +63,7 @@ def test_evaluating_changes_nothing_for_the_training(problem, make_network):
     outcomes = []
     for evaluate_per_epoch in (1, 1000):
         network = make_network(sizes)
-        parameters = QmixParameters(
+        parameters = TableParameters(
             n_epochs=60, learning_starts=10, evaluate_per_epoch=evaluate_per_epoch, epsilon_anneal_steps=200
         )
         _, streams = train(problem, network, parameters)
@@ -75,34 +74,26 @@ def test_evaluating_changes_nothing_for_the_training(problem, make_network):
 
 def test_updates_begin_with_a_full_buffer_and_come_once_an_epoch(problem, network):
     calls = []
-    train(problem, network, QmixParameters(n_epochs=25, buffer_size=20, batch_size=8), calls=calls)
+    train(problem, network, TableParameters(n_epochs=25, buffer_size=20, batch_size=8), calls=calls)
     assert calls == [("update", 8)] * 6
 
 
 def test_updates_can_begin_earlier(problem, network):
     calls = []
-    train(problem, network, QmixParameters(n_epochs=7, learning_starts=3, batch_size=4), calls=calls)
+    train(problem, network, TableParameters(n_epochs=7, learning_starts=3, batch_size=4), calls=calls)
     assert calls == [("update", 3)] + [("update", 4)] * 4
 
 
 def test_target_network_is_copied_every_so_many_epochs(problem, network):
     calls = []
-    parameters = QmixParameters(n_epochs=9, learning_starts=3, update_target_params=4)
+    parameters = TableParameters(n_epochs=9, learning_starts=3, update_target_params=4)
     train(problem, network, parameters, calls=calls)
     assert [call for call in calls if call[0] == "target"] == [("target", 2), ("target", 6)]
 
 
-def test_target_network_period_counts_updates_too_in_transfer(problem, network):
-    calls = []
-    parameters = TransferQmixParameters(n_epochs=9, learning_starts=4, update_target_params=5).table_3()
-    train(problem, network, parameters, calls=calls, count_updates=True)
-    # Epoch 5 is the second update, the fifth update is epoch 8.
-    assert [call for call in calls if call[0] == "target"] == [("target", 2), ("target", 5)]
-
-
 def test_warm_start_explores_as_a_trained_policy_does(problem, network):
     """Trap: epsilon restarted at 1 destroys what was transferred."""
-    parameters = TransferQmixParameters().table_3()
+    parameters = TransferQmixParameters(mode="paper").table()
     assert parameters.epsilon_start == parameters.epsilon_end == 0.05
     epsilons = []
     environment = SwarmEnvironment(problem)
@@ -118,9 +109,8 @@ def test_warm_start_explores_as_a_trained_policy_does(problem, network):
         evaluator=Actor(SwarmEnvironment(problem), network),
         learner=Learner(network, 5e-4, 0.99, 10.0),
         buffer=ReplayBuffer(100, environment.sizes, problem.max_steps),
-        parameters=TransferQmixParameters(n_epochs=20).table_3(),
+        parameters=TransferQmixParameters(mode="paper", n_epochs=20).table(),
         streams=random_streams(0),
-        count_updates=True,
     )
     trainer.run(Incumbent.empty(problem), never, lambda progress: None)
     assert set(epsilons) == {0.05}
@@ -141,7 +131,7 @@ def test_exploration_is_annealed_over_environment_steps(problem, network):
         evaluator=Actor(SwarmEnvironment(problem), network),
         learner=Learner(network, 5e-4, 0.99, 10.0),
         buffer=ReplayBuffer(100, environment.sizes, problem.max_steps),
-        parameters=QmixParameters(n_epochs=60, epsilon_anneal_steps=100),
+        parameters=TableParameters(n_epochs=60, epsilon_anneal_steps=100),
         streams=random_streams(0),
     )
     training = trainer.run(Incumbent.empty(problem), never, lambda progress: None)
@@ -151,7 +141,7 @@ def test_exploration_is_annealed_over_environment_steps(problem, network):
 
 
 def test_history_has_the_evaluations_and_the_last_epoch(problem, network):
-    training, _ = train(problem, network, QmixParameters(n_epochs=25, evaluate_per_epoch=10))
+    training, _ = train(problem, network, TableParameters(n_epochs=25, evaluate_per_epoch=10))
     assert training.history.epoch == [0, 10, 20, 25]
     assert training.epochs == 25
 
@@ -159,7 +149,7 @@ def test_history_has_the_evaluations_and_the_last_epoch(problem, network):
 def test_incumbent_is_the_best_of_all_evaluations_and_explorations(problem, network):
     """Its reward is the plan's, and progress never tells of a worse one."""
     told = []
-    parameters = QmixParameters(n_epochs=80, evaluate_per_epoch=5, learning_starts=20)
+    parameters = TableParameters(n_epochs=80, evaluate_per_epoch=5, learning_starts=20)
     training, _ = train(problem, network, parameters, report=told.append)
     best = training.incumbent
     assert reward_of(problem, best.plan) == pytest.approx(best.reward, abs=1e-9)
@@ -173,12 +163,12 @@ def test_incumbent_is_the_best_of_all_evaluations_and_explorations(problem, netw
 
 
 def test_best_plan_may_come_from_exploration(problem, network):
-    training, _ = train(problem, network, QmixParameters(n_epochs=90, evaluate_per_epoch=1000))
+    training, _ = train(problem, network, TableParameters(n_epochs=90, evaluate_per_epoch=1000))
     assert training.incumbent.reward > max(0.0, *training.history.reward)
 
 
 def test_stopping_at_once_evaluates_and_returns_a_legal_plan(problem, network):
-    training, _ = train(problem, network, QmixParameters(), stop=at_once())
+    training, _ = train(problem, network, TableParameters(), stop=at_once())
     assert training.epochs == 0
     assert training.history.epoch == [0]
     assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)
@@ -187,7 +177,7 @@ def test_stopping_at_once_evaluates_and_returns_a_legal_plan(problem, network):
 def test_stop_is_asked_before_every_epoch(problem, network):
     told = []
     training, _ = train(
-        problem, network, QmixParameters(), stop=When(lambda: len(told) == 7), report=told.append
+        problem, network, TableParameters(), stop=When(lambda: len(told) == 7), report=told.append
     )
     assert training.epochs == 7
 
@@ -200,7 +190,7 @@ def test_nothing_to_fly_is_nothing_to_learn(make_network):
         objective=Objective(1.0, charge_return=True),
     )
     network = make_network(SwarmEnvironment(problem).sizes)
-    training, _ = train(problem, network, QmixParameters())
+    training, _ = train(problem, network, TableParameters())
     assert training.incumbent.plan == Plan.empty(1, 1)
     assert training.incumbent.reward == pytest.approx(-5)
     assert training.history.reward == pytest.approx([-5])
@@ -215,7 +205,7 @@ def test_result_is_never_worse_than_sending_everybody_home(make_network):
         objective=Objective(1.0, charge_return=True),
     )
     network = make_network(SwarmEnvironment(problem).sizes)
-    training, _ = train(problem, network, QmixParameters(n_epochs=30, learning_starts=5))
+    training, _ = train(problem, network, TableParameters(n_epochs=30, learning_starts=5))
     assert training.incumbent.reward >= -1.0
     assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)
 
@@ -241,7 +231,7 @@ def test_stop_is_asked_within_an_epoch(problem, network):
         asked.append(len(asked))
         return len(asked) == 3
 
-    training, _ = train(problem, network, QmixParameters(), stop=When(stop))
+    training, _ = train(problem, network, TableParameters(), stop=When(stop))
     assert len(asked) == 3
     assert (training.epochs, training.steps) == (0, 0)
     assert reward_of(problem, training.incumbent.plan) == pytest.approx(training.incumbent.reward)

@@ -16,7 +16,7 @@ from app.learning.architecture import NetworkSizes
 from app.learning.episode import Actor
 from app.learning.learner import Learner
 from app.learning.networks import QmixNetwork
-from app.learning.parameters import QmixParameters
+from app.learning.parameters import TableParameters
 from app.learning.random_streams import random_streams
 from app.learning.replay_buffer import ReplayBuffer
 from app.learning.trainer import Incumbent, Trainer
@@ -71,7 +71,7 @@ class SumOfAgents(nn.Module):
 
 def learned_reward(network_of, seed):
     """Reward of the greedy policy after learning from random actions only."""
-    parameters = QmixParameters(
+    parameters = TableParameters(
         n_epochs=750, evaluate_per_epoch=750, learning_starts=32, lr=2e-3, epsilon_end=1.0,
         update_target_params=50,
     )  # fmt: skip

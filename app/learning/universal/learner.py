@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from app.learning.parameters import SERVICE_GRAD_NORM_CLIP
 from app.learning.universal.mixer import UniversalMixer
 from app.learning.universal.network import UniversalAgent
 from app.learning.universal.observation import scales
@@ -182,7 +183,7 @@ class Learner:
         torch.stack(list(losses.values())).sum().backward()  # type: ignore[no-untyped-call]  # untyped in torch
         if stop():
             return {}
-        nn.utils.clip_grad_norm_(self._trained.parameters(), 1.0)
+        nn.utils.clip_grad_norm_(self._trained.parameters(), SERVICE_GRAD_NORM_CLIP)
         for optimiser in self.optimisers:
             optimiser.step()
         with torch.no_grad():

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.learning.kernels import Float32s
+from app.learning.parameters import SERVICE_EPSILON
 from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.inference import ask_together, attention_bias, compile_agent
 from app.learning.universal.network import UniversalAgent
@@ -26,14 +27,10 @@ from app.simulation.simulator import Episodes, act, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never
 
-_EPSILON = 0.2
-"""Chance that a turn of every other episode is any that is allowed: where a policy has become sure, no
-bearable temperature makes it try something else, and recombination lives on routes that are new."""
-
 
 def exploration(episodes: int) -> Floats:
     """Return the ``epsilon`` (B,) of episodes of which every other one explores."""
-    return np.where(np.arange(episodes) % 2, _EPSILON, 0.0)
+    return np.where(np.arange(episodes) % 2, SERVICE_EPSILON, 0.0)
 
 
 class Played(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoint import encode
-from app.learning.parameters import QmixParameters
+from app.learning.parameters import LEARNING_RATE, QmixParameters
 from app.learning.universal.architecture import HEADS, WIDEST, UniversalConfig
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.fine_tuning import TURN_TOKENS, FineTuning
@@ -22,9 +22,6 @@ from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
-
-LEARNING_RATE = 1e-3
-"""Of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
 
 
 def fits(arrays: ProblemArrays) -> bool:
@@ -50,7 +47,7 @@ class UniversalScratch:
     ) -> None:
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
         width = min(WIDEST, -(-parameters.drqn_hidden_dim // HEADS) * HEADS)
-        self._parameters = parameters.model_copy(update={"drqn_hidden_dim": width})
+        self._parameters = parameters.in_service().model_copy(update={"drqn_hidden_dim": width})
         self._config = UniversalConfig(width=width, qmix_hidden_dim=parameters.qmix_hidden_dim)
         self._arrays = compile_problem(problem)
         self._best = BestPlan(self._arrays)

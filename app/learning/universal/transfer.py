@@ -15,7 +15,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoint import encode
-from app.learning.parameters import REPLANS_A_SAMPLE, TransferQmixParameters
+from app.learning.parameters import FINE_TUNING_LR, REPLANS_A_SAMPLE, TransferQmixParameters
 from app.learning.source_policies import Source
 from app.learning.universal.best_plan import BestPlan
 from app.learning.universal.effort import Effort, batch_of, effort
@@ -33,9 +33,6 @@ from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, none_spare
 
-FINE_TUNING_LR = 1e-4
-"""Learning rate of Adam; the parameter ``lr`` is that of the paper's RMSprop."""
-
 _TRIED_AT_SIGHT = 2
 """Policies of the shortlist that are tried where a greedy roll-out is all that is asked for."""
 
@@ -48,6 +45,7 @@ class Used:
     """The parameters with all defaults filled in."""
 
     parameters: TransferQmixParameters
+    orders: int
     samples: int
     replans: int
     n_epochs: int
@@ -86,13 +84,14 @@ class UniversalTransfer:
         self._arrays = compile_problem(problem)
         self._effort = effort(self._arrays)
         self._used = fill_in(parameters, self._effort)
+        self._asked_once = parameters.orders == 1
         self._best = BestPlan(self._arrays)
         self._recombination = Recombination(self._arrays, self._best)
         self._history = History()
         root = np.random.SeedSequence([abs(seed), int(seed < 0)])
         streams = map(np.random.default_rng, root.spawn(5))
         self._sampling, self._tuning, self._polishing, ordering, self._replanning = streams
-        self._orders = some_orders(self._effort.orders, problem.n_uavs, ordering)
+        self._orders = some_orders(self._used.orders, problem.n_uavs, ordering)
 
     def run(self, sources: Sequence[Source]) -> Solution:
         """Solve it from the best of some policies for every size, nearest first.
@@ -139,7 +138,8 @@ class UniversalTransfer:
         tried, orders = sources[: self._effort.policies], self._orders
         if self._used.is_bare:
             # As many roll-outs as of one policy in all orders, which earn no more.
-            tried, orders = tried[:_TRIED_AT_SIGHT], orders[: -(-len(orders) // _TRIED_AT_SIGHT)]
+            tried = tried[: 1 if self._asked_once else _TRIED_AT_SIGHT]
+            orders = orders[: -(-len(orders) // len(tried))]
 
         def play_from(source: Source) -> Integers:
             policy = cast(UniversalPolicy, source.network)
@@ -238,7 +238,8 @@ class UniversalTransfer:
 
 
 def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
-    """Fill in what a request leaves open."""
+    """Fill in what a request leaves open, and what service mode has whatever is asked for."""
+    orders = default.orders if parameters.orders is None else parameters.orders
     samples = default.samples if parameters.samples is None else parameters.samples
     n_epochs = default.n_epochs if parameters.n_epochs is None else parameters.n_epochs
     polished = parameters.polish is not False
@@ -247,8 +248,9 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     # Who asks for samples alone asks for them quickly.
     replans = REPLANS_A_SAMPLE * samples if n_epochs or moves else 0
     replans = replans if parameters.replans is None else parameters.replans
-    filled = parameters.model_copy(
+    filled = parameters.in_service().model_copy(
         update={
+            "orders": orders,
             "samples": samples,
             "replans": replans,
             "n_epochs": n_epochs,
@@ -256,4 +258,4 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
             "polish_moves": moves,
         }
     )
-    return Used(filled, samples, replans, n_epochs, moves)
+    return Used(filled, orders, samples, replans, n_epochs, moves)
