@@ -64,7 +64,7 @@ class Auto:
         arrays = compile_problem(problem)
         given = self._parameters
         search, history = new_search(arrays), History()
-        set_routes(search, greedy_plan(problem).as_array())
+        set_routes(search, greedy_plan(problem, stop).as_array())
         moves, restarts = how_long(search, given.moves, given.restarts, stop)
         policy = policy_pays(arrays, stop.seconds_left()) if given.policy is None else given.policy
         source = None

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from app.solvers.seeds import seed_sequence
+
 
 class RandomStreams(NamedTuple):
     """One generator a purpose, so that drawing more for one purpose changes nothing for another."""
@@ -22,10 +24,8 @@ def random_streams(seed: int) -> RandomStreams:
     Parameters
     ----------
     seed
-        Any integer.
+        0 or more.
     """
-    # The entropy of a SeedSequence is not negative: the sign is a word of its own.
-    root = np.random.SeedSequence([abs(seed), int(seed < 0)])
-    initialisation, exploration, replay = root.spawn(3)
+    initialisation, exploration, replay = seed_sequence(seed, 0).spawn(3)
     generator = torch.Generator().manual_seed(int(initialisation.generate_state(1, np.uint64)[0]))
     return RandomStreams(generator, np.random.default_rng(exploration), np.random.default_rng(replay))

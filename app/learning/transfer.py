@@ -28,6 +28,7 @@ from app.learning.universal.transfer import UniversalTransfer, fill_in
 from app.simulation.arrays import compile_problem
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import Progress, Report, Solution, SolverContext, StopCriterion
+from app.solvers.seeds import seed_sequence
 
 _TUNING_SHARE = 0.5
 """Of the progress, where a local search follows the fine-tuning of a policy for one size."""
@@ -141,13 +142,13 @@ def _fine_tune_and_polish(
     best = BestPlan(arrays)
     best.consider(tuned.plan.as_array()[None])
     if not used.is_bare:
-        best.consider(greedy_plan(problem).as_array()[None])
+        best.consider(greedy_plan(problem, stop).as_array()[None])
     epochs = tuned.history.epoch[-1]
     polish(
         arrays,
         best,
         used.polish_moves,
-        np.random.default_rng([abs(seed), int(seed < 0)]),
+        np.random.default_rng(seed_sequence(seed, 0)),
         stop,
         lambda done: report(Progress(share + (1 - share) * done, epochs, best.reward, best.plan)),
     )

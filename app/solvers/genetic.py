@@ -21,6 +21,7 @@ from app.simulation.compilation import njit
 from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
 from app.solvers.parameters import GeneticParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
+from app.solvers.seeds import seed_sequence
 
 CHUNK_GENES = 100_000
 """Genes decoded between two looks at the stop criterion: some milliseconds."""
@@ -59,7 +60,7 @@ class GeneticAlgorithm:
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`."""
         _check_size(self.parameters.num_total, problem)
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(seed_sequence(seed))
         genes = (problem.max_steps, problem.n_uavs)
         arrays = compile_problem(problem)
         flight = Flight(

@@ -168,6 +168,8 @@ class Solution:
         What was learned, as a checkpoint of :mod:`app.learning.checkpoint`, or None.
     proof
         How good the plan is, if the algorithm knows; of plans that unload greedily.
+    answered_by
+        The algorithm whose plan it is, by its name in the registry, where it is not this one's; else None.
     """
 
     plan: Plan
@@ -176,6 +178,7 @@ class Solution:
     source_policy: SourcePolicy | None = None
     checkpoint: bytes | None = None
     proof: Proof | None = None
+    answered_by: str | None = None
 
 
 class Solver(Protocol):
@@ -189,8 +192,8 @@ class Solver(Protocol):
         problem
             The problem.
         seed
-            Source of all randomness: the same problem, seed and parameters give the same solution as long
-            as `stop` does not end it early.
+            0 or more; source of all randomness: the same problem, seed and parameters give the same solution
+            as long as `stop` does not end it early.
         stop
             Asked at least every few milliseconds of work, where the algorithm allows.
         report

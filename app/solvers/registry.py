@@ -16,6 +16,9 @@ from pydantic import ValidationError
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
 from app.solvers.protocol import STORED, Parameters, Solver, SolverContext
 
+_FLOOR = "app.solvers.floor:Floor"
+"""Keeps every algorithm's answers from falling below what is known without it."""
+
 _PLANNED_UNLOADING = "app.solvers.unloading.solver:PlannedUnloading"
 """Lends every algorithm the unloading that is planned."""
 
@@ -36,6 +39,9 @@ class Algorithm:
         ``"module:Class"`` of its :class:`~app.solvers.protocol.Parameters`, in a module without torch.
     learns
         Whether its solutions carry a checkpoint that the library can hold.
+    papers
+        Whether it is one of the paper's own in every mode. Its answers are compared with the greedy rule's,
+        so they are its own also where they earn less.
     """
 
     name: str
@@ -43,6 +49,7 @@ class Algorithm:
     solver: str
     parameters: str
     learns: bool = False
+    papers: bool = False
 
     def parameter_model(self) -> type[Parameters]:
         """Return the class of its parameters."""
@@ -71,12 +78,14 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "Q-learning over the joint action space (Eq. 15); small problems only, to compare with",
             "app.learning.dqn:Dqn",
             "app.learning.parameters:DqnParameters",
+            papers=True,
         ),
         Algorithm(
             "ga",
             "The paper's genetic algorithm (Table 2)",
             "app.solvers.genetic:GeneticAlgorithm",
             "app.solvers.parameters:GeneticParameters",
+            papers=True,
         ),
         Algorithm(
             "local_search",
@@ -159,13 +168,19 @@ def parse_parameters(name: str, given: Mapping[str, Any], *, stored: bool = Fals
 def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
     """Load an algorithm's implementation and build it, able to plan the unloading too.
 
+    No answer of it earns less than staying at home, and none but of the paper's own algorithms and modes less
+    than the greedy rule.
+
     Raises
     ------
     UnknownAlgorithm
         If there is no such algorithm.
     """
-    solver = _resolve(algorithm(name).solver)
-    return cast(Solver, _resolve(_PLANNED_UNLOADING)(solver(parameters, context)))
+    line = algorithm(name)
+    solver = _resolve(line.solver)(parameters, context)
+    papers = line.papers or getattr(parameters, "mode", None) == "paper"
+    floored = _resolve(_FLOOR)(solver, parameters, greedy=not papers, learns=line.learns)
+    return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored))
 
 
 def _resolve(dotted: str) -> Any:

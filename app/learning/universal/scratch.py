@@ -22,6 +22,7 @@ from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
+from app.solvers.seeds import seed_sequence
 
 
 def fits(arrays: ProblemArrays) -> bool:
@@ -52,7 +53,7 @@ class UniversalScratch:
         self._arrays = compile_problem(problem)
         self._best = BestPlan(self._arrays)
         self._history = History()
-        initial, episodes = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(2)
+        initial, episodes = seed_sequence(seed, 0).spawn(2)
         policy = UniversalPolicy.of_seed(self._config, int(initial.generate_state(1)[0]))
         self._tuning = FineTuning(
             policy,
@@ -70,7 +71,7 @@ class UniversalScratch:
             # Nobody can fly anywhere, so there is nothing to learn.
             self._history.add(0, self._best.reward)
             return self._solution(0)
-        self._best.consider(greedy_plan(self._problem).as_array()[None])
+        self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
         self._evaluate(0)
         temperature = Temperature(self._arrays)
         recombination = Recombination(self._arrays, self._best)

@@ -13,6 +13,7 @@ from app.learning.universal.rollout import play_in_orders
 from app.learning.universal.turn_order import some_orders
 from app.simulation.arrays import Integers, ProblemArrays
 from app.solvers.protocol import SourcePolicy, StopCriterion
+from app.solvers.seeds import seed_sequence
 
 
 def policy_starts(
@@ -46,7 +47,7 @@ def policy_starts(
     source = SourcePolicies(library_url).shortlist(problem)[0]
     if not isinstance(source.network, UniversalPolicy):
         return None
-    rng = np.random.default_rng([abs(seed), int(seed < 0)])
+    rng = np.random.default_rng(seed_sequence(seed, 0))
     orders = some_orders(effort(arrays).orders, problem.n_uavs, rng)
     with one_thread():
         return play_in_orders(source.network.agent, arrays, orders, stop=stop), source.policy

@@ -32,6 +32,7 @@ from app.simulation.arrays import Integers, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, none_spare
+from app.solvers.seeds import seed_sequence
 
 _TRIED_AT_SIGHT = 2
 """Policies of the shortlist that are tried where a greedy roll-out is all that is asked for."""
@@ -88,7 +89,7 @@ class UniversalTransfer:
         self._best = BestPlan(self._arrays)
         self._recombination = Recombination(self._arrays, self._best)
         self._history = History()
-        root = np.random.SeedSequence([abs(seed), int(seed < 0)])
+        root = seed_sequence(seed, 0)
         streams = map(np.random.default_rng, root.spawn(5))
         self._sampling, self._tuning, self._polishing, ordering, self._replanning = streams
         self._orders = some_orders(self._used.orders, problem.n_uavs, ordering)
@@ -109,7 +110,7 @@ class UniversalTransfer:
             self._history.add(0, self._best.reward)
             return Solution(self._best.plan, self._history, used.parameters, sources[0].policy)
         if not used.is_bare:
-            self._best.consider(greedy_plan(self._problem).as_array()[None])
+            self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
         source = None
         if self._effort.policy or used.is_bare or used.parameters.source is not None:
             source, reward = self._roll_out(sources)

@@ -15,6 +15,7 @@ from app.solvers.local_search.effort import default_moves, default_restarts, mov
 from app.solvers.local_search.improvement import Cooling, Watch, improve_together
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
+from app.solvers.seeds import seed_sequence
 from app.solvers.stop import WhileSpare
 
 
@@ -29,7 +30,7 @@ class LocalSearch:
         """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the greedy rule's plan."""
         arrays = compile_problem(problem)
         search, history = new_search(arrays), History()
-        set_routes(search, greedy_plan(problem).as_array())
+        set_routes(search, greedy_plan(problem, stop).as_array())
         moves, restarts = how_long(search, self.parameters.moves, self.parameters.restarts, stop)
         history.add(0, float(search.best[0]))
         watch = watching(search, history, report)
@@ -65,7 +66,7 @@ def search_on(
     spare = 0 if math.isinf(stop.seconds_left()) else context.spare_threads()
     stops = [stop] * context.threads
     stops += [WhileSpare(stop, context.spare_threads, place) for place in range(1, spare + 1)]
-    streams = np.random.SeedSequence([abs(seed), int(seed < 0)]).spawn(len(stops))
+    streams = seed_sequence(seed, 0).spawn(len(stops))
     searches = [search, *(replica(search) for _ in stops[1:])]
     generators = [np.random.default_rng(stream) for stream in streams]
     improve_together(searches, generators, stops, moves, rounds, Cooling(), watch)

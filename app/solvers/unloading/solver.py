@@ -12,9 +12,11 @@ from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.simulator import ALLOWED, replay_delivering
 from app.simulation.unloading import best_deliveries
+from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of
 from app.solvers.protocol import History, Progress, Report, Solution, Solver, StopCriterion
 from app.solvers.scale import largest_level
+from app.solvers.seeds import seed_sequence
 from app.solvers.stop import share_of_time
 from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
 
@@ -61,7 +63,7 @@ class PlannedUnloading:
         The history's epochs are the algorithm's, with its rewards, which are those of greedy unloading, and
         one more for every round of the search.
         """
-        if problem.objective.unloading == "greedy":
+        if problem.objective.unloading == "greedy" or nothing_to_fly(problem):
             return self.algorithm.solve(problem, seed, stop, report)
         greedy = replace(problem, objective=replace(problem.objective, unloading="greedy"))
         incumbent = _Incumbent(problem)
@@ -74,7 +76,7 @@ class PlannedUnloading:
         solution = self.algorithm.solve(greedy, seed, share_of_time(stop, _ALGORITHM_SHARE), told)
         incumbent.consider(solution.plan)
         history = History(list(solution.history.epoch), list(solution.history.reward))
-        rng = np.random.default_rng([abs(seed), int(seed < 0), 1])
+        rng = np.random.default_rng(seed_sequence(seed, 0, 1))
         _improve(incumbent, rng, stop, report, history)
         return replace(solution, plan=incumbent.plan, history=history)
 

@@ -1,0 +1,75 @@
+"""What no answer is worse than, whatever the algorithm: staying at home, and the greedy rule."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.simulation.arrays import compile_problem
+from app.simulation.explain import reward_of
+from app.simulation.simulator import new_episodes
+from app.solvers.greedy import greedy_plan
+from app.solvers.protocol import (
+    History,
+    Parameters,
+    Progress,
+    Proof,
+    Report,
+    Solution,
+    Solver,
+    StopCriterion,
+)
+
+
+def nothing_to_fly(problem: Problem) -> bool:
+    """Say whether no UAV has an allowed visit, so that there is but one plan."""
+    return bool(new_episodes(compile_problem(problem), 1).done[0])
+
+
+class Floor:
+    """A :class:`~app.solvers.protocol.Solver` whose answers, and what it tells, never fall below a floor.
+
+    Where the algorithm's own plan earns less, the plan of the floor is the answer, and ``answered_by`` says
+    so if it is the greedy rule's. The history stays the algorithm's.
+
+    Parameters
+    ----------
+    algorithm
+        The one that solves.
+    parameters
+        What it was built with.
+    greedy
+        Whether the floor is the greedy rule's plan, as far as there is time for it; if not, it is staying at
+        home.
+    learns
+        Whether what it learns is asked for even where nothing can be flown. Otherwise it is not run there.
+    """
+
+    def __init__(self, algorithm: Solver, parameters: Parameters, *, greedy: bool, learns: bool) -> None:
+        self._algorithm, self._parameters, self._greedy, self._learns = algorithm, parameters, greedy, learns
+
+    def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
+        """See :class:`~app.solvers.protocol.Solver`; its own ``solve`` gets the same."""
+        plan = Plan.empty(problem.n_uavs, problem.n_targets)
+        reward = reward_of(problem, plan)
+        if not self._learns and nothing_to_fly(problem):
+            report(Progress(1.0, 0, reward, plan))
+            return Solution(plan, History([0], [reward]), self._parameters, proof=Proof(reward, True))
+        answered_by = None
+        if self._greedy:
+            by_rule = greedy_plan(problem, stop)
+            earned = reward_of(problem, by_rule)
+            if earned > reward:
+                plan, reward, answered_by = by_rule, earned, "greedy"
+
+        def told(progress: Progress) -> None:
+            if progress.best_reward < reward:
+                progress = replace(progress, best_reward=reward, incumbent=plan)
+            report(progress)
+
+        solution = self._algorithm.solve(problem, seed, stop, told)
+        if reward_of(problem, solution.plan) >= reward:
+            return solution
+        proof = solution.proof and replace(solution.proof, bound=max(solution.proof.bound, reward))
+        return replace(solution, plan=plan, proof=proof, answered_by=answered_by)

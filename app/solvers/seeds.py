@@ -1,0 +1,29 @@
+"""Seeds of requests, and the streams of random numbers that come of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.domain.errors import InvalidParameters, Violation
+
+
+def seed_sequence(seed: int, *purpose: int) -> np.random.SeedSequence:
+    """Return what all randomness of a solver comes from.
+
+    Parameters
+    ----------
+    seed
+        Of the request, 0 or more.
+    purpose
+        Numbers that keep streams of the same seed apart. The genetic algorithm has none; searches and
+        learners have 0, the search with planned unloading 0 and 1.
+
+    Raises
+    ------
+    InvalidParameters
+        If the seed is negative.
+    """
+    if seed < 0:
+        detail = f"a seed is 0 or more, not {seed}"
+        raise InvalidParameters(detail, [Violation("/seed", detail)])
+    return np.random.SeedSequence([seed, *purpose])
