@@ -9,6 +9,7 @@ from app.solvers.bound.instance import new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree
 from app.solvers.bound.upper_bound import bound_without_sets, enumerate_sets, sets_are_few
+from app.solvers.local_search.annealing import ROUNDING
 from app.solvers.local_search.effort import default_moves
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
@@ -62,7 +63,7 @@ class Exact:
             if joint.actions is not None:
                 found = Plan.of(joint.actions, problem.n_targets)
                 earned = reward_of(problem, found)
-                if earned > reward:
+                if earned > reward + ROUNDING * abs(reward):
                     plan, reward = found, earned
                     # Also where the node could not be closed.
                     tree.lower = max(tree.lower, earned / instance.scale)

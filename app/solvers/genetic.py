@@ -26,6 +26,9 @@ from app.solvers.seeds import seed_sequence
 CHUNK_GENES = 100_000
 """Genes decoded between two looks at the stop criterion: some milliseconds."""
 
+_EQUAL = 1e-12
+"""Relative difference of rewards that is only rounding."""
+
 MAX_GENES = 50_000_000
 """Largest population times steps times UAVs; a population of that size takes 400 MB, twice."""
 
@@ -75,7 +78,7 @@ class GeneticAlgorithm:
             children, child_fitness = np.empty_like(population), np.empty_like(fitness)
 
         def incumbent() -> Plan:
-            decode(flight, population[fitness.argmax()])
+            decode(flight, population[fittest(fitness)])
             return Plan.of(flight.actions, problem.n_targets)
 
         history = History()
@@ -91,7 +94,7 @@ class GeneticAlgorithm:
                 )
                 population, children = children, population
                 fitness, child_fitness = child_fitness, fitness
-                best = fitness.max(keepdims=True)
+                best = np.array([fitness[fittest(fitness)]])
             for reward in best:
                 done += 1
                 history.add(done, float(reward))
@@ -230,7 +233,7 @@ def evolve(
         breed(flight, population, fitness, children, child_fitness, start, len(fitness), rates, rng)
         population, children = children, population
         fitness, child_fitness = child_fitness, fitness
-        best[generation] = fitness.max()
+        best[generation] = fitness[fittest(fitness)]
     return population, fitness
 
 
@@ -265,7 +268,8 @@ def breed(
     _, steps, m = population.shape
     home = flight.arrays.level.shape[1]
     if first == 0:
-        children[0], child_fitness[0] = population[np.argmax(fitness)], fitness.max()
+        best = fittest(fitness)
+        children[0], child_fitness[0] = population[best], fitness[best]
         first = 1
     for c in range(first, last):
         mother = population[_winner(fitness, rng)]
@@ -282,4 +286,14 @@ def breed(
 def _winner(fitness: Floats, rng: np.random.Generator) -> int:
     """Binary tournament."""
     a, b = rng.integers(0, len(fitness)), rng.integers(0, len(fitness))
-    return int(a if fitness[a] >= fitness[b] else b)
+    return int(a if fitness[a] >= fitness[b] - _EQUAL * abs(fitness[b]) else b)
+
+
+@njit(cache=True, error_model="numpy")
+def fittest(fitness: Floats) -> int:
+    """Return the first of the best chromosomes; rewards that differ by rounding only are equal."""
+    most = fitness.max()
+    for c in range(len(fitness)):
+        if fitness[c] >= most - _EQUAL * abs(most):
+            return c
+    return 0

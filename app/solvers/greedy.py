@@ -28,7 +28,7 @@ from app.solvers.protocol import History, Progress, Report, Solution, SolverCont
 from app.solvers.stop import never
 
 _ROUNDING = 1e-12
-"""Relative error that sums of amounts may have, and more."""
+"""Relative error that sums of amounts and earnings may have, and more."""
 
 _LOOKS = 400_000
 """Visits that are looked at between two looks at the stop criterion: a few milliseconds."""
@@ -121,7 +121,9 @@ def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int)
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
             unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
-        earned = arrays.level[0, j] * unloaded / arrays.need_total[0, j] - cost
-        if earned > best:
+        gain = arrays.level[0, j] * unloaded / arrays.need_total[0, j]
+        earned = gain - cost
+        # Of equals the first, whatever rounding makes of them.
+        if earned > best + _ROUNDING * gain:
             best, chosen = earned, j
     return chosen

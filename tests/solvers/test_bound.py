@@ -1,11 +1,15 @@
 """Bounds against the best there is: by brute force, under both unloading rules, whenever they are stopped."""
 
+from dataclasses import replace
+
 import highspy
 import numpy as np
 import pytest
 from brute_force import best_reward
 from brute_force_unloading import best_planned_reward
+from cases import problem_of
 from problems import random_problem
+from stopping import After
 
 from app.domain.problem import Objective, Problem, Target
 from app.domain.records import problem_to_record
@@ -29,19 +33,13 @@ def small_problems(seed, count):
     return found
 
 
-def stop_after(looks):
-    """True from the given look on."""
-    seen = iter(range(looks))
-    return lambda: next(seen, None) is None
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_no_plan_with_greedy_unloading_earns_more(seed):
     for problem in small_problems(seed, 15):
         best = best_reward(problem_to_record(problem))
         for given in (None, reward_of(problem, greedy_plan(problem))):
             for looks in (0, 2, 10**9):
-                bound = upper_bound(problem, given, stop_after(looks))
+                bound = upper_bound(problem, given, After(looks))
                 assert bound.value >= best - 1e-12 * abs(best)
 
 
@@ -76,16 +74,14 @@ def test_the_bound_for_large_problems_holds_for_small_ones():
         exact = upper_bound(problem, None, never).value
         lower = reward_of(problem, greedy_plan(problem)) / instance.scale
         for looks in (0, 1, 5, 10**9):
-            assert visit_bound(instance, lower, stop_after(looks)) * instance.scale >= exact - 1e-7 * abs(
-                exact
-            )
+            assert visit_bound(instance, lower, After(looks)) * instance.scale >= exact - 1e-7 * abs(exact)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_it_falls_for_as_long_as_it_is_let_and_never_below_the_reward(family):
     problem = generate(family, 5, 6, 3, np.random.default_rng(3))
     reward = reward_of(problem, greedy_plan(problem))
-    values = [upper_bound(problem, reward, stop_after(looks)).value for looks in (0, 3, 10, 100, 10**9)]
+    values = [upper_bound(problem, reward, After(looks)).value for looks in (0, 3, 10, 100, 10**9)]
     assert values[-1] >= reward
     assert values == sorted(values, reverse=True)
 
@@ -130,7 +126,28 @@ def test_where_nothing_can_be_done_the_bound_is_what_staying_at_home_earns():
 
 
 @pytest.mark.parametrize(
-    ("bound", "reward", "expected"), [(4.0, 3.0, 0.25), (4.0, 4.0, 0.0), (0.0, 0.0, 0.0), (-1.0, -2.0, None)]
+    ("bound", "reward", "expected"), [(4.0, 3.0, 0.25), (4.0, 4.0, 0.0), (0.0, 0.0, None), (-1.0, -2.0, None)]
 )
 def test_gap(bound, reward, expected):
     assert gap(bound, reward) == expected
+
+
+def test_a_bound_of_nothing_is_nothing():
+    """Not the margin for rounding errors, of which the gap would be the whole."""
+    bound = upper_bound(problem_of("F4a-gap-one-all-returned"), 0.0, never)
+    assert bound == (0.0, True)
+    assert gap(bound.value, 0.0) is None
+    for m, n in ((4, 5), (40, 70)):
+        # Every visit costs more than it earns.
+        problem = generate("uniform", m, n, 3, np.random.default_rng(1))
+        problem = replace(problem, objective=Objective(distance_weight=1e6))
+        assert upper_bound(problem, 0.0, never).value == 0.0
+
+
+def test_it_can_be_stopped_anywhere():
+    problem = generate("uniform", 4, 9, 3, np.random.default_rng(4))
+    best = upper_bound(problem, None, never).value
+    bounds = [upper_bound(problem, None, After(looks)).value for looks in (0, 1, 4, 8, 12, 20, 40, 80, 10**6)]
+    assert all(bound >= best for bound in bounds)
+    assert bounds[-1] == best
+    assert max(bounds) > best

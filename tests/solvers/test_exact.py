@@ -1,5 +1,8 @@
 """The proven best plan against brute force; what is not proven says so and is still bounded."""
 
+import time
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from brute_force import best_reward
@@ -10,10 +13,12 @@ from app.domain.records import problem_to_record
 from app.simulation.explain import reward_of
 from app.simulation.generator import generate
 from app.solvers.exact import Exact
+from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
 from app.solvers.protocol import SolverContext
-from app.solvers.stop import never
+from app.solvers.registry import create_solver
+from app.solvers.stop import Deadline, never
 
 
 def solve(problem, stop=never, **parameters):
@@ -58,3 +63,32 @@ def test_too_large_a_problem_is_answered_with_a_bound():
     solution = solve(problem, stop=After(40))
     assert not solution.proof.proven
     assert solution.proof.bound >= reward_of(problem, solution.plan)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize(("family", "m", "n"), [("uniform", 10, 5), ("deadline", 5, 10)])
+def test_a_time_limit_takes_no_proof_away(family, m, n, threads):
+    """The search for a first plan takes a small share of the time, however long it could go on."""
+    problem = generate(family, m, n, 3, np.random.default_rng(4))
+    stop = Deadline(6.0, time.process_time)
+    exact = Exact(ExactParameters(), SolverContext(threads=threads))
+    assert exact.solve(problem, 1, stop, lambda _told: None).proof.proven
+
+
+def test_nor_does_planned_unloading():
+    problem = generate("uniform", 5, 5, 3, np.random.default_rng(4))
+    problem = replace(problem, objective=replace(problem.objective, unloading="planned"))
+    solver = create_solver("exact", ExactParameters(), SolverContext())
+    stop = Deadline(6.0, time.process_time)
+    assert solver.solve(problem, 1, stop, lambda _told: None).proof.proven
+
+
+def test_it_can_be_stopped_anywhere():
+    problem = generate("uniform", 4, 6, 3, np.random.default_rng(4))
+    best = reward_of(problem, solve(problem).plan)
+    floor = reward_of(problem, greedy_plan(problem))
+    for looks in (0, 1, 300, 350, 400, 500):
+        solution = solve(problem, stop=After(looks))
+        reward = reward_of(problem, solution.plan)
+        assert floor <= reward <= best + 1e-9
+        assert solution.proof.bound >= best - 1e-12 * best

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from brute_force import best_reward
 from brute_force_unloading import best_planned_reward
+from cases import problem_of
 from problems import random_problem
 from referee import replay
 from stopping import After
@@ -346,3 +347,34 @@ def test_a_search_is_cold_when_its_time_is_up(monkeypatch):
     assert temperatures[-1][1] == pytest.approx(cooling.cold * scale, rel=0.1)
     assert [progress.fraction for progress in told] == sorted(progress.fraction for progress in told)
     assert told[-1].fraction == 1.0
+
+
+FAR_AWAY = {
+    "local-search-33-percent-below-exact": 1.0054918,
+    "local-search-low-cluster-243": 0.2765954,
+    "tight-cluster-6x14": 17.0415125,
+}
+
+
+@pytest.mark.parametrize("name", FAR_AWAY)
+def test_areas_close_together_and_far_away_are_flown_to(name):
+    problem = problem_of(name)
+    earned = reward_of(problem, solve(problem, moves=150_000).plan)
+    assert earned >= FAR_AWAY[name] * (1.0 - 1e-6)
+
+
+def test_the_search_leaves_home_where_no_visit_pays_alone():
+    """The way to the village costs more than any area in it earns, and less than two of them do."""
+    uavs = tuple(UAV(f"uav-{i}", *4 * (0.0,), speed=60.0, voyage=30.0, loadlist=(20.0,)) for i in range(2))
+    targets = tuple(Target(f"area-{j}", 10.0 + 0.01 * j, 0.0, 1.0, (5.0,)) for j in range(8))
+    problem = Problem(uavs, targets, 4, objective=Objective(distance_weight=0.15))
+    assert reward_of(problem, greedy_plan(problem)) == 0.0
+    assert reward_of(problem, solve(problem, moves=50_000).plan) == pytest.approx(8 - 3.0, abs=0.05)
+
+
+def test_where_a_uav_has_been_far_away_rewards_are_as_exact():
+    problem = generate("uniform", 4, 8, 2, np.random.default_rng(5))
+    uavs = tuple(replace(uav, dis=1e9, voyage=uav.voyage + 1e9) for uav in problem.uavs)
+    far = replace(problem, uavs=uavs)
+    solution = solve(far, moves=20_000)
+    assert solution.history.reward[-1] == pytest.approx(reward_of(far, solution.plan), rel=1e-12)

@@ -1,4 +1,4 @@
-"""Levels, and what distance costs, in another unit: the same plans."""
+"""Levels, and what distance costs, in another unit: the same plans, but of networks, which have 24 bits."""
 
 from dataclasses import replace
 
@@ -19,7 +19,6 @@ QUICK = {
     "local_search": {"moves": 20_000, "restarts": 3},
     "auto": {"moves": 20_000, "restarts": 3},
     "exact": {"nodes": 30},
-    "qmix": {"n_epochs": 8, "batch_size": 4},
 }
 
 

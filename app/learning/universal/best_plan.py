@@ -8,6 +8,7 @@ from app.domain.plan import Plan
 from app.simulation.arrays import Integers, ProblemArrays
 from app.simulation.explain import rewards_of
 from app.simulation.simulator import ALLOWED
+from app.solvers.local_search.annealing import ROUNDING
 
 
 class BestPlan:
@@ -33,8 +34,10 @@ class BestPlan:
         """
         replay = rewards_of(self._arrays, plans)
         rewards = np.where(replay.rule == ALLOWED, replay.reward, -np.inf)
-        best = int(rewards.argmax())
-        if rewards[best] > self.reward:
+        most = rewards.max()
+        # Of equals the first, whatever rounding makes of them.
+        best = int((rewards >= most - ROUNDING * abs(most)).argmax()) if most > -np.inf else 0
+        if rewards[best] > self.reward + ROUNDING * abs(self.reward):
             self.reward = float(rewards[best])
             self.actions[:] = self._arrays.shape[1]
             self.actions[: plans.shape[1]] = plans[best]

@@ -12,6 +12,9 @@ from app.simulation.explain import rewards_of
 _REPEATED = 0.2
 """Share of episodes as good as the best plan above which it gets warmer; with none of them it cools."""
 
+_EQUAL = 1e-9
+"""Relative difference of rewards that is none."""
+
 _WARMER = 1.15
 _HOTTEST = 50.0
 
@@ -39,7 +42,7 @@ class Temperature:
         known
             Reward of the best plan before them.
         """
-        repeated = (rewards_of(self._arrays, plans).reward >= known - 1e-9).mean()
+        repeated = (rewards_of(self._arrays, plans).reward >= known - _EQUAL * abs(known)).mean()
         if repeated == 0.0:
             self.value = max(1.0, self.value / _WARMER)
         elif repeated > _REPEATED:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.solvers.local_search.annealing import Search, actions_of, anneal, drop_useless, set_routes
+from app.solvers.local_search.annealing import ROUNDING, Search, actions_of, anneal, drop_useless, set_routes
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
@@ -203,10 +203,12 @@ def _share_best(searches: Sequence[Search]) -> None:
     """Let every search go on from the best incumbent; of equals the first one's."""
     if len(searches) == 1:
         return
-    best = max(searches, key=lambda search: float(search.best[0]))
+    most = max(float(search.best[0]) for search in searches)
+    enough = most - ROUNDING * abs(most)
+    best = next(search for search in searches if search.best[0] >= enough)
     actions = actions_of(best)
     for search in searches:
-        if search is not best and search.best[0] < best.best[0]:
+        if search is not best and search.best[0] < enough:
             set_routes(search, actions)
 
 
