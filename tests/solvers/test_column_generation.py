@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from parcels import legal_routes, parcels
 from referee import replay
+from stopping import After
 
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
@@ -47,10 +48,6 @@ def problem_of(variant, seed, **changes):
     return parcels(rng, **{"m": 3, "n": 6, "steps": 4, **VARIANTS[variant], **changes})
 
 
-def never_ended():
-    return False
-
-
 def all_routes(problem, arrays):
     """A pool of every set of targets that a UAV can visit, with the length of its best order."""
     pool = new_pool(arrays)
@@ -66,7 +63,7 @@ def closed(problem, best=-1e9, **options):
     arrays = compile_problem(problem)
     pool = new_pool(arrays)
     packing, pricing = Packing(arrays, pool), Pricing(arrays, pool, **options)
-    return packing, pricing, pricing.close(packing, best, never_ended), pool
+    return packing, pricing, pricing.close(packing, best, never), pool
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -163,7 +160,7 @@ def test_routes_that_no_better_plan_can_use_are_not_added():
 def test_a_dive_ends_in_a_plan_worth_what_it_was_asked_for(variant):
     problem = problem_of(variant, 5, n=10, m=4)
     packing, pricing, relaxed, _ = closed(problem)
-    actions = dive(packing, pricing, relaxed, -1e9, never_ended)
+    actions = dive(packing, pricing, relaxed, -1e9, never)
     assert packing.fixed == []
     search = new_search(compile_problem(problem))
     set_routes(search, actions)
@@ -171,7 +168,7 @@ def test_a_dive_ends_in_a_plan_worth_what_it_was_asked_for(variant):
     reward = float(search.best[0])
     assert 0.7 * relaxed.reward <= reward <= relaxed.reward + 1e-6
     assert replay(problem_to_record(problem), actions_of(search).tolist())["reward"] == pytest.approx(reward)
-    assert dive(packing, pricing, packing.relax(), relaxed.reward + 1.0, never_ended) is None
+    assert dive(packing, pricing, packing.relax(), relaxed.reward + 1.0, never) is None
 
 
 def test_fixed_routes_are_used_and_count():
@@ -219,15 +216,15 @@ def test_the_bound_over_visits_is_left_where_labels_are_too_many(monkeypatch):
 def test_a_combination_ends_when_it_is_told_to():
     problem = parcels(np.random.default_rng(23), m=6, n=40, latest=0.6)
     search = new_search(compile_problem(problem))
-    looks = iter(range(1000))
     combination = Combination([search], rounds=2, left=math.inf)
-    combination.after_round(1, 2, lambda: next(looks) >= 3)
-    asked = next(looks)
-    assert 3 < asked < 40
+    stop = After(3)
+    combination.after_round(1, 2, stop)
+    assert 3 < stop.asked < 40
     assert not combination.proven
     whole = Combination([search], rounds=2, left=math.inf)
-    whole.after_round(1, 2, lambda: next(looks, None) is None)
-    assert next(looks) > 2 * asked
+    going_on = After(1000)
+    whole.after_round(1, 2, going_on)
+    assert going_on.asked > 2 * stop.asked
     assert search.best[0] > 0.0
 
 

@@ -35,7 +35,7 @@ def plan_of(name, problem):
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.7])
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", sorted(QUICK))
 def test_the_unit_of_the_levels_changes_no_plan(name, weight):
     problem = generate("uniform", 5, 9, 3, np.random.default_rng(3))
     plan = plan_of(name, in_unit(problem, 1.0, weight))

@@ -20,6 +20,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_probl
 from app.simulation.generator import FAMILIES
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, new_search, set_routes
+from app.solvers.scale import largest_level
 
 
 class Demonstrations(NamedTuple):
@@ -86,7 +87,7 @@ def demonstrate(
             continue
         start, heat = _start(problem, arrays, rng, agent)
         set_routes(search, start)
-        scale = max(float(arrays.level[0].max()), 1e-12)
+        scale = largest_level(arrays)
         stream = np.random.Generator(np.random.SFC64(rng.integers(2**63)))
         anneal(search, stream, shard.moves, heat * scale, 0.001 * scale, 0.01 * scale)
         if search.best[0] <= 1e-3 * scale:

@@ -10,6 +10,9 @@ from app.domain.problem import Problem
 from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
 from app.solvers.scale import largest_level
 
+_DIGITS = 2.0**38
+"""Precision of levels and prices here: coarser than rounding errors, finer than the margin of the bounds."""
+
 
 class Instance(NamedTuple):
     """One problem, scaled.
@@ -50,14 +53,21 @@ def new_instance(problem: Problem) -> Instance:
     need, load, level = arrays.need[0], arrays.load[0], arrays.level[0]
     wanted = arrays.need_total[0] > 0
     scale = largest_level(arrays)
+    earned = rounded(level / scale)
     share = need / np.where(wanted, arrays.need_total[0], 1.0)[:, None]
-    price = float(arrays.weight[0]) / scale
+    price = float(rounded(arrays.weight / scale)[0])
     out = ~arrays.ret[0]
     charged = out & bool(arrays.charge_return[0])
     # As a product of matrices: with many materials much quicker than comparing each with each.
     useful = out[:, None] & ((load > 0).astype(np.float32) @ (need > 0).astype(np.float32).T > 0)
     idle = np.where(charged, -price * arrays.start_home[0], 0.0)
-    return Instance(arrays, scale, (level / scale)[:, None] * share, need, load, price, idle, useful)
+    return Instance(arrays, scale, earned[:, None] * share, need, load, price, idle, useful)
+
+
+def rounded(values: Floats) -> Floats:
+    """Round numbers to :data:`_DIGITS`: then the unit in which levels were given leaves no trace."""
+    fraction, exponent = np.frexp(values)
+    return np.ldexp(np.round(fraction * _DIGITS) / _DIGITS, exponent)
 
 
 def ceiling(instance: Instance) -> float:

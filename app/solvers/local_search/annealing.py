@@ -22,10 +22,18 @@ from app.solvers.local_search.change import (
     undo,
 )
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
-from app.solvers.local_search.routes import DISTANCE, NONE, SATISFACTION, USELESS, Routes, empty_routes
+from app.solvers.local_search.routes import (
+    DISTANCE,
+    NONE,
+    SATISFACTION,
+    USELESS,
+    Routes,
+    empty_routes,
+    sum_up,
+)
 
-ROUNDING = 1e-12
-"""Relative error that the totals of a plan may have after many changes, and more."""
+ROUNDING = 1e-11
+"""Relative error that the totals of a plan may have after the changes of a call, and more."""
 
 
 class Search(NamedTuple):
@@ -187,6 +195,7 @@ def anneal(
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
     weight = arrays.weight[0]
+    sum_up(arrays, routes)
     kept = 0
     temperature = hot
     cooling = math.exp(math.log(cold / hot) / max(moves, 1))

@@ -144,6 +144,18 @@ def lay(
 
 
 @compiled
+def sum_up(arrays: ProblemArrays, routes: Routes) -> None:
+    """Add the totals up anew: each change leaves a rounding error in them."""
+    m = routes.length.shape[0]
+    satisfaction, distance = 0.0, 0.0
+    for i in range(m):
+        for s in range(routes.length[i]):
+            satisfaction += routes.earned[s * m + i]
+        distance += charged_distance(arrays, i, routes.target[i], routes.length[i], routes.flown[i])
+    routes.total[SATISFACTION], routes.total[DISTANCE] = satisfaction, distance
+
+
+@compiled
 def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: int, flown: Floats) -> float:
     """Distance of a route as far as it costs reward."""
     distance = flown[length]
