@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -163,8 +163,15 @@ class Allocation(AnswerModel):
     """A plan, what it earns, and how it was found."""
 
     job_id: str = Field(description="The job that found it, see `GET /jobs/{job_id}`")
-    algorithm: str = Field(description="The algorithm that was used")
-    parameters: dict[str, Any] = Field(description="Its parameters as they were used, defaults filled in")
+    algorithm: str = Field(description="The algorithm that was asked for")
+    answered_by: str | None = Field(
+        default=None,
+        description="The algorithm whose plan it is: `greedy` where no time was left for another; null in "
+        "answers of versions that did not say so",
+    )
+    parameters: dict[str, Any] = Field(
+        description="The parameters of the algorithm that was asked for, defaults filled in"
+    )
     seed: int = Field(description="The seed that was used")
     assignment: list[list[int]] = Field(
         description="One joint action a step: for each UAV the index of its target, or N for home"
@@ -188,6 +195,12 @@ class Allocation(AnswerModel):
     )
     routes: list[RouteModel] = Field(description="One a UAV")
     unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
+    reasons: Literal["complete", "pending", "incomplete"] = Field(
+        default="complete",
+        description="Whether the reasons of `unmet` are all there: `pending` where the time limit left none "
+        "to look for them, then the result of `GET /jobs/{job_id}` has them soon after; `incomplete` where "
+        "they will not come",
+    )
     warnings: list[WarningModel] = Field(
         default_factory=list,
         description="What in the problem was probably not meant; nothing is refused for it",

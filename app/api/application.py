@@ -53,6 +53,8 @@ _READ_HEADERS = (
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
 _WARM_UP, _WARM_UP_RESERVE = "app.jobs.warm_up:warm_up", "app.jobs.warm_up:warm_up_at_once"
 _REQUEST_THREADS = 8
+_SEARCHES_LEAVE = 5
+"""Niceness of the workers: a third of a core's time where somebody else has something to do on it."""
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
 
@@ -132,7 +134,7 @@ def _workers(settings: Settings, database: Database) -> Executor:
     """Make what runs the jobs."""
     arguments = *_largest(settings), database.url
     if settings.executor == "local":
-        return _local(settings.workers, _WARM_UP, arguments, settings, database)
+        return _local(settings.workers, _WARM_UP, arguments, settings, database, _SEARCHES_LEAVE)
     return RayExecutor(
         settings.workers,
         address=settings.ray_address,
@@ -150,7 +152,12 @@ def _largest(settings: Settings) -> tuple[int, int]:
 
 
 def _local(
-    slots: int, warm_up: str, arguments: tuple[Any, ...], settings: Settings, database: Database
+    slots: int,
+    warm_up: str,
+    arguments: tuple[Any, ...],
+    settings: Settings,
+    database: Database,
+    niceness: int = 0,
 ) -> LocalExecutor:
     return LocalExecutor(
         slots,
@@ -158,6 +165,7 @@ def _local(
         warm_up_arguments=arguments,
         environment=_environment(database),
         log_level=settings.log_level,
+        niceness=niceness,
     )
 
 

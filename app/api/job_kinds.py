@@ -8,7 +8,7 @@ from sqlalchemy import Connection
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
-from app.jobs.model import Job, JobKind, WorkResult
+from app.jobs.model import FollowUp, Job, JobKind, WorkResult
 from app.library.entries import new_policy
 from policy_store.checkpoint import ContainerLimits
 from policy_store.library import PolicyLibrary
@@ -17,6 +17,15 @@ ALLOCATE = "allocate"
 BATCH = "batch"
 TRAIN = "train"
 REGISTER = "register"
+
+_REASONS = FollowUp("app.jobs.work:complete_reasons", {"reasons": "incomplete"})
+
+
+def _effort(payload: dict[str, Any]) -> float:
+    """Return how much larger than a small one an allocation is, to read, to plan greedily and to write."""
+    problem = payload["problem"]
+    m, n, k = len(problem["uavs"]), len(problem["targets"]), len(problem["uavs"][0]["loadlist"])
+    return 1.0 + (m * n / 1000 + (m + 2 * n) * (1.0 + k / 16)) / 400
 
 
 def job_kinds(
@@ -48,8 +57,10 @@ def job_kinds(
             "interactive",
             at_once="app.jobs.work:allocate_at_once",
             max_run_s=max_run_s,
+            effort=_effort,
+            follow_up=_REASONS,
         ),
-        JobKind(BATCH, "app.jobs.work:allocate", "batch", max_run_s=max_run_s),
+        JobKind(BATCH, "app.jobs.work:allocate", "batch", max_run_s=max_run_s, follow_up=_REASONS),
         JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library, max_run_s=max_training_s),
         # The weights are the job's artifact, and the policy's.
         JobKind(

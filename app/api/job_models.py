@@ -28,6 +28,7 @@ class ProgressModel(ProgressSummary):
     """How far a job is, and the best it has found."""
 
     assignment: list[list[int]] | None = Field(description="The best plan so far")
+    answered_by: str | None = Field(default=None, description="The algorithm that found it")
 
 
 class JobErrorModel(AnswerModel):

@@ -10,7 +10,7 @@ import asyncio
 import logging
 import random
 import time
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -21,16 +21,18 @@ from app.jobs.channel import Channels
 from app.jobs.company import Reactions
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor
+from app.jobs.follow_up import FollowUps
 from app.jobs.housekeeping import Housekeeping
-from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes
+from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes, QueueLimit
 from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, JobSummary, Lane, Load, Progress
 from app.jobs.observer import JobObserver
 from app.jobs.recovery import Recovery
-from app.jobs.run import Run, Runs
+from app.jobs.run import Run, Runs, handed_over
 from app.jobs.settling import Settling
 from app.jobs.shared import company_on
-from app.jobs.store import JobStore, QueueLimit
+from app.jobs.spawning import spawn
+from app.jobs.store import JobStore
 from app.jobs.transitions import Claim
 from app.jobs.waiting import Waiting
 from app.jobs.writer import Writer
@@ -42,7 +44,6 @@ _SETTLE_S = 20.0
 _LATEST_RETURN = 1.5
 
 _log = logging.getLogger(__name__)
-T = TypeVar("T")
 J = TypeVar("J", bound=JobSummary)
 
 
@@ -90,6 +91,7 @@ class Dispatcher:
         self._wake = asyncio.Event()
         self._company = company_on(store.database, owner, lease_s, self._writer, self._runs, channels)
         self._last_minute = LastMinute(self._answer_at_once, self._clock.now)
+        self._follow_ups = FollowUps(store.unfinished, self._writer, self._kinds, reserve, self._has_spare)
         self._waiting = Waiting(
             self._lanes,
             self._kinds,
@@ -106,10 +108,9 @@ class Dispatcher:
             partial(self._tell_end, ran_s=None),
         )
         self._reserve_ready = asyncio.Event()
-        self._watching: asyncio.Task[None] | None = None
         self._dispatching: asyncio.Task[None] | None = None
         self._house = Housekeeping(store, self._writer, self._runs, self._recovery.look_after, retention_s)
-        self._housekeeping: asyncio.Task[None] | None = None
+        self._keeping: list[asyncio.Task[None]] = []
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
         self._accepting = False
@@ -137,14 +138,15 @@ class Dispatcher:
             await self._reserve.start(self._reserve_ready.set)
         self._wake.set()
         self._dispatching = asyncio.create_task(self._dispatch())
-        self._housekeeping = asyncio.create_task(self._house.keep())
-        self._watching = asyncio.create_task(self._last_minute.keep())
+        keepers = self._house, self._last_minute, self._follow_ups
+        self._keeping = [asyncio.create_task(keeper.keep()) for keeper in keepers]
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
         self._accepting = False
         self._wake.set()
         self._last_minute.end()
+        self._follow_ups.end()
         self._reserve_ready.set()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
         if self._requests:
@@ -158,11 +160,9 @@ class Dispatcher:
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
         self._ended.set()
-        if self._watching is not None:
-            await self._watching
         self._house.end()
-        if self._housekeeping is not None:
-            await self._housekeeping
+        for task in self._keeping:
+            await task
         await self._company.leave()
         await self._executor.close()
         if self._reserve is not None:
@@ -182,7 +182,7 @@ class Dispatcher:
         if kind not in self._kinds:
             raise UnknownJobKind(kind)
         admit = self._admit(self._kinds[kind], payload, time_limit_s, idempotency)
-        return await asyncio.shield(_spawn(admit, self._requests))
+        return await asyncio.shield(spawn(admit, self._requests))
 
     async def _admit(
         self,
@@ -231,7 +231,7 @@ class Dispatcher:
         """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""
         if self._ended.is_set():
             raise Draining
-        return await asyncio.shield(_spawn(self._cancel(job_id), self._requests))
+        return await asyncio.shield(spawn(self._cancel(job_id), self._requests))
 
     async def _cancel(self, job_id: str) -> Job:
         job, before = await self._writer.write(self._store.cancel, job_id)
@@ -289,19 +289,23 @@ class Dispatcher:
                     self._waiting.less(claim.job)
                     self._begin(claim)
 
-    async def _answer_at_once(self, job_id: str) -> float | None:
-        """Answer a job whose time is up while it waits, beside the workers; return the seconds it took."""
+    async def _answer_at_once(self, job_ids: Sequence[str]) -> dict[str, float]:
+        """Answer jobs whose time is up while they wait, beside the workers; return the seconds each took."""
         # Taken before a process has started to answer it, it could be out of its grace by then.
         while self._accepting and self._reserve is not None and self._reserve.ready == 0:
             self._reserve_ready.clear()
             await self._reserve_ready.wait()
-        begun = time.monotonic()
-        claim = await self._writer.write(self._store.claim_this, job_id)
-        if claim is None:
-            return None
-        self._waiting.less(claim.job)
-        await asyncio.wait([self._begin(claim, at_once=True)])
-        return time.monotonic() - begun
+        self._follow_ups.make_way()
+        ended, took = time.monotonic(), {}
+        claims = await self._writer.write(self._store.claim_these, job_ids)
+        for claim in claims:
+            self._waiting.less(claim.job)
+        # While one is brought onto the disk the next is being answered.
+        tasks = [(claim, self._begin(claim, at_once=True)) for claim in claims]
+        for claim, task in tasks:
+            await asyncio.wait([task])
+            took[claim.job.id], ended = time.monotonic() - ended, time.monotonic()
+        return took
 
     def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.
@@ -329,7 +333,7 @@ class Dispatcher:
         loop = asyncio.get_running_loop()
         run.execution = executor.submit(
             work,
-            job.payload,
+            handed_over(job),
             time_left_s=left,
             on_progress=on_progress,
             labels=job.labels,
@@ -338,7 +342,7 @@ class Dispatcher:
             run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
         if kind.max_run_s is not None:
             run.timers.append(loop.call_later(kind.max_run_s, run.stop, self._grace_s, "time"))
-        return _spawn(self._finish(run, run.execution), self._finishing)
+        return spawn(self._finish(run, run.execution), self._finishing)
 
     async def _finish(self, run: Run, execution: Execution) -> None:
         """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
@@ -359,6 +363,8 @@ class Dispatcher:
                 _log.warning("a job went on without attempt %d", run.job.attempt)
             elif job.status is JobStatus.SUCCEEDED and not run.at_once:
                 self._lanes.ran(job.lane, [took])
+            if job is not None and job.unfinished:
+                self._follow_ups.more()
         self._runs.remove(run)
         if job is not None and job.status.finished:
             self._tell_end(job, took)
@@ -386,14 +392,9 @@ class Dispatcher:
             },
         )
 
+    def _has_spare(self) -> bool:
+        return not self._last_minute.busy and sum(self._lanes.running.values()) < self._executor.capacity
+
     def _give_back(self, lane: Lane) -> None:
         self._lanes.running[lane] -= 1
         self._wake.set()
-
-
-def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:
-    """Run a coroutine that goes on if its caller is cancelled; ``among`` keeps it from being collected."""
-    task = asyncio.create_task(work)
-    among.add(task)
-    task.add_done_callback(among.discard)
-    return task

@@ -12,6 +12,7 @@ from app.jobs.run import Runs
 from app.jobs.store import JobStore
 from app.jobs.writer import Writer
 
+_TICK_S = 0.25
 _SAVE_INTERVAL_S = 1.0
 _LOOK_INTERVAL_S = 15.0
 _EXPIRE_INTERVAL_S, _EXPIRED_AT_ONCE = 600.0, 50
@@ -57,7 +58,7 @@ class Housekeeping:
         """Keep house until the end; what fails is tried again at its next time."""
         looked, expired = time.monotonic(), float("-inf")
         while not self._ended.is_set():
-            await rung(self._ended, _SAVE_INTERVAL_S)
+            await rung(self._ended, _TICK_S)
             try:
                 await self._save_progress()
                 if time.monotonic() - looked >= _LOOK_INTERVAL_S:

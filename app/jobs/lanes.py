@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from statistics import fmean
 
 from app.jobs.model import LANES, Lane
 
 REMEMBERED_DURATIONS = 50
 _UNMEASURED_DURATION_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class QueueLimit:
+    """How many jobs of a lane may wait, and what to tell a caller for whom there is no place."""
+
+    places: int
+    retry_after_s: float
 
 
 class Lanes:

@@ -8,20 +8,69 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from statistics import fmean
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from statistics import median_high
+from typing import NamedTuple
 
 from app.jobs.channel import rung
 
 _REMEMBERED = 16
-_UNMEASURED_S = 0.05
+_UNMEASURED_S = 0.02
+"""What an answer of the least effort is expected to take before one was measured."""
+
 _CAUTION = 1.5
+_LEAD_S = 0.03
+"""Out of the queue, and from the disk to the client: what every group takes once."""
+
+_LARGEST_GROUP, _LONGEST_GROUP_S = 16, 0.25
+"""Jobs that are taken out of the queue at once, and how long they may take together."""
+
 _LONGEST_LOOK_S = 60.0
 _PAUSE_S = 0.1
 
 _log = logging.getLogger(__name__)
+
+
+class Wait(NamedTuple):
+    """A job that waits.
+
+    Attributes
+    ----------
+    deadline
+        When its time is up.
+    effort
+        How much there is to do for its answer, in the least that there can be.
+    """
+
+    deadline: float
+    effort: float = 1.0
+
+
+class Pace:
+    """Expects of an answer the median of what the last ones of its effort took, or in proportion of others.
+
+    One that took long by accident changes nothing.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[int, deque[float]] = {}
+
+    def took(self, effort: float, seconds: float) -> None:
+        """Note how long an answer took."""
+        last = self._last.setdefault(_class_of(effort), deque(maxlen=_REMEMBERED))
+        last.append(seconds / max(1.0, effort))
+
+    def expected(self, effort: float) -> float:
+        """Return the seconds that an answer takes."""
+        last = self._last.get(_class_of(effort)) or [each for some in self._last.values() for each in some]
+        return max(1.0, effort) * (median_high(last) if last else _UNMEASURED_S)
+
+
+def _class_of(effort: float) -> int:
+    return int(math.log2(max(1.0, effort)))
 
 
 class LastMinute:
@@ -30,33 +79,45 @@ class LastMinute:
     Parameters
     ----------
     answer
-        Answers a job if it still waits, and returns how many seconds that took; None if it did not wait.
+        Answers those jobs, of some, that still wait, and returns how many seconds each took.
     now
         The clock that deadlines are by.
     """
 
     def __init__(
-        self, answer: Callable[[str], Awaitable[float | None]], now: Callable[[], float] = time.time
+        self,
+        answer: Callable[[Sequence[str]], Awaitable[Mapping[str, float]]],
+        now: Callable[[], float] = time.time,
     ) -> None:
         self._answer, self._now = answer, now
-        self._deadlines: dict[str, float] = {}
-        self._took: deque[float] = deque(maxlen=_REMEMBERED)
+        self._waits: dict[str, Wait] = {}
+        self._pace = Pace()
         self._changed = asyncio.Event()
+        self._answering = False
         self._ended = False
 
-    def watch(self, job_id: str, deadline: float) -> None:
-        """Take note of a job that waits, and when its time is up."""
-        self._deadlines[job_id] = deadline
+    @property
+    def busy(self) -> bool:
+        """Whether a job is being answered, or watched."""
+        return self._answering or bool(self._waits)
+
+    def watch(self, job_id: str, deadline: float, effort: float = 1.0) -> None:
+        """Take note of a job that waits, when its time is up, and how much there is to do for it."""
+        self._waits[job_id] = Wait(deadline, effort)
         self._changed.set()
 
     def watch_only(self, deadlines: Mapping[str, float]) -> None:
         """Take note of all the jobs that wait, by their id, and of no others."""
-        self._deadlines = dict(deadlines)
+        known = self._waits
+        self._waits = {
+            job_id: known.get(job_id, Wait(deadline))._replace(deadline=deadline)
+            for job_id, deadline in deadlines.items()
+        }
         self._changed.set()
 
     def forget(self, job_id: str) -> None:
         """Take note that a job waits no more."""
-        self._deadlines.pop(job_id, None)
+        self._waits.pop(job_id, None)
 
     def end(self) -> None:
         """Make :meth:`keep` return after what it is at."""
@@ -67,35 +128,64 @@ class LastMinute:
         """Answer the jobs whose time has come, until the end."""
         while not self._ended:
             self._changed.clear()
-            if not self._deadlines:
+            if not self._waits:
                 await self._changed.wait()
                 continue
-            in_s = latest_start(list(self._deadlines.values()), self._took) - self._now()
+            now = self._now()
+            in_s = latest_start(self._waits.values(), self._pace) - now
             if in_s > 0:
                 await rung(self._changed, min(in_s, _LONGEST_LOOK_S))
                 continue
-            job_id = min(self._deadlines, key=self._deadlines.__getitem__)
-            deadline = self._deadlines.pop(job_id)
+            group = {job_id: self._waits.pop(job_id) for job_id in due(self._waits, self._pace, now)}
+            self._answering = True
             try:
-                took_s = await self._answer(job_id)
-                if took_s is not None:
-                    self._took.append(took_s)
+                for job_id, seconds in (await self._answer(tuple(group))).items():
+                    self._pace.took(group[job_id].effort, seconds)
             except Exception:
-                _log.exception("a job's time is up and it could not be answered; there will be another try")
-                self._deadlines.setdefault(job_id, deadline)
+                _log.exception("jobs whose time is up could not be answered; there will be another try")
+                self._waits = {**group, **self._waits}
                 await asyncio.sleep(_PAUSE_S)
+            finally:
+                self._answering = False
 
 
-def latest_start(deadlines: Sequence[float], took_s: Sequence[float]) -> float:
+def latest_start(waits: Iterable[Wait], pace: Pace) -> float:
     """Return when to begin with the first, so that each is done in time.
 
     Parameters
     ----------
-    deadlines
-        When each has to be done, at least one.
-    took_s
-        How long the last ones took: the first is expected to take as long as the slowest, those after it as
-        long as the mean, and half as long again.
+    waits
+        Those that wait, at least one.
+    pace
+        How long each takes; it is expected to take half as long again.
     """
-    mean, longest = _CAUTION * fmean(took_s or [_UNMEASURED_S]), max(took_s, default=_UNMEASURED_S)
-    return min(deadline - longest - place * mean for place, deadline in enumerate(sorted(deadlines)))
+    latest, all_s = math.inf, _LEAD_S
+    for wait in sorted(waits):
+        all_s += _CAUTION * pace.expected(wait.effort)
+        latest = min(latest, wait.deadline - all_s)
+    return latest
+
+
+def due(waits: Mapping[str, Wait], pace: Pace, now: float) -> list[str]:
+    """Return the jobs to answer now, together.
+
+    That is the one whose time is up first, and those whose turn comes while these are being answered.
+
+    Parameters
+    ----------
+    waits
+        Those that wait by their id, at least one.
+    pace
+        As above.
+    now
+        The time.
+    """
+    order = sorted(waits, key=lambda job_id: waits[job_id])
+    group, all_s = 1, _CAUTION * pace.expected(waits[order[0]].effort)
+    while group < min(len(order), _LARGEST_GROUP):
+        rest = [waits[job_id] for job_id in order[group:]]
+        all_s += _CAUTION * pace.expected(rest[0].effort)
+        if all_s > _LONGEST_GROUP_S or latest_start(rest, pace) > now + all_s:
+            break
+        group += 1
+    return order[:group]

@@ -12,7 +12,7 @@ Every dispatch counts ``attempt`` up, so a result of an earlier dispatch can be 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from datetime import datetime
 from enum import StrEnum
@@ -21,6 +21,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
+
+BEST_KNOWN = "best_known"
+"""The field of the payload in which a job that is begun again gets its progress, where that has a plan."""
 
 Lane = Literal["interactive", "batch", "training"]
 LANES: tuple[Lane, ...] = ("interactive", "batch", "training")
@@ -59,12 +62,15 @@ class Progress:
         Reward of the best plan so far.
     assignment
         The best plan so far: at most S joint actions of M targets each.
+    answered_by
+        The algorithm that found it; None where nothing says so.
     """
 
     fraction: float = 0.0
     epoch: int | None = None
     best_reward: float | None = None
     assignment: list[list[int]] | None = None
+    answered_by: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object."""
@@ -94,6 +100,8 @@ class JobSummary:
         UTC; ``started_at`` is of the newest attempt.
     has_artifact
         Whether the work left bytes behind.
+    unfinished
+        Whether its result is still to be completed.
     request_id, key_id
         The request that asked for it, and the API key of that request; None where there is none.
     """
@@ -109,6 +117,7 @@ class JobSummary:
     started_at: datetime | None
     finished_at: datetime | None
     has_artifact: bool
+    unfinished: bool = False
     request_id: str | None = None
     key_id: str | None = None
 
@@ -211,10 +220,43 @@ class Idempotency:
 
 @dataclass(frozen=True, slots=True)
 class WorkResult:
-    """What a work function returns: a JSON-ready result without NaN, and bytes to keep beside it."""
+    """What a work function returns.
+
+    Attributes
+    ----------
+    result
+        JSON-ready, without NaN.
+    artifact
+        Bytes to keep beside it.
+    unfinished
+        Whether the kind's follow-up is to complete the result after the job's end.
+    """
 
     result: dict[str, Any]
     artifact: bytes | None = None
+    unfinished: bool = False
+
+
+def _the_least(_payload: dict[str, Any]) -> float:
+    return 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class FollowUp:
+    """What completes a result.
+
+    Attributes
+    ----------
+    work
+        ``"module:function"``, light as ``at_once``. It gets the payload with the ``result`` beside, and
+        returns the fields of the result that change; where it is unfinished itself, nothing does.
+    given_up
+        The fields of the result that change where it will not be completed: the job was cancelled, too many
+        wait for it, or it failed too often.
+    """
+
+    work: str
+    given_up: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,6 +285,10 @@ class JobKind:
     max_run_s
         How long its work may take, in seconds, whatever its time limit; then it is stopped as by that. None:
         as long as it likes.
+    effort
+        How much ``at_once`` has to do for a payload, in the least that there can be.
+    follow_up
+        Completes, after the job's end, a result that was returned as unfinished. None: it stays so.
     """
 
     name: str
@@ -252,3 +298,5 @@ class JobKind:
     dropped_fields: frozenset[str] = frozenset()
     at_once: str | None = None
     max_run_s: float | None = None
+    effort: Callable[[dict[str, Any]], float] = _the_least
+    follow_up: FollowUp | None = None

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Collection
 
 from app.jobs.company import Company
-from app.jobs.model import Job, Progress
+from app.jobs.model import Job
 from app.jobs.run import Run
 from app.jobs.store import JobStore
 from app.jobs.waiting import Waiting
@@ -70,7 +70,7 @@ class Recovery:
         """Put back a job that was taken in a commit of which this service never learned."""
         if any(run.job.id == job_id for run in self._unsettled):
             return
-        job = await self._writer.write(self._store.release, job_id, attempt, Progress())
+        job = await self._writer.write(self._store.release, job_id, attempt, None)
         if job is not None and job.status.finished:
             self._tell_end(job)
         elif job is not None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from app.jobs.channel import Channel
 from app.jobs.executor import Execution
-from app.jobs.model import Job, Lane, Progress
+from app.jobs.model import BEST_KNOWN, Job, Lane, Progress
 
 Reason = Literal["time", "cancel", "stop", "gone"]
 """Why a worker was killed: its work did not end with its time, or its cancellation, or the service; or the
@@ -109,3 +109,10 @@ class Runs:
         """Return the newest attempt at a job; None if it does not run here."""
         attempts = [run for (of, _), run in self._runs.items() if of == job_id]
         return max(attempts, key=lambda run: run.job.attempt, default=None)
+
+
+def handed_over(job: Job) -> dict[str, Any]:
+    """Return what the work gets: the payload, and the progress of an earlier attempt if it has a plan."""
+    if job.attempt == 1 or job.progress.assignment is None:
+        return job.payload
+    return {**job.payload, BEST_KNOWN: job.progress.as_json()}

@@ -44,6 +44,7 @@ class Settling:
                     outcome.work,
                     progress,
                     self._kinds[job.kind].on_success,
+                    self._kinds[job.kind].follow_up,
                 )
             except Exception as exception:
                 _log.exception("a job's result could not be stored")

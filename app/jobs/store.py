@@ -12,8 +12,8 @@ The methods block on the disk (a commit is one fsync): call them from a thread, 
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -24,8 +24,10 @@ from sqlalchemy import Connection, RowMapping
 from app.jobs.clock import Clock
 from app.jobs.errors import IdempotencyMismatch, QueueFull
 from app.jobs.failure import failure
+from app.jobs.lanes import QueueLimit
 from app.jobs.model import (
     FINISHED,
+    FollowUp,
     Idempotency,
     Job,
     JobKind,
@@ -49,20 +51,14 @@ from app.jobs.transitions import (
     requeue,
     select_jobs,
     select_jobs_to_change,
+    take,
 )
+from app.jobs.unfinished import UnfinishedResults, has_place
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
 OnSuccess = Callable[[Connection, Job, WorkResult], dict[str, Any]]
-
-
-@dataclass(frozen=True, slots=True)
-class QueueLimit:
-    """How many jobs of a lane may wait, and what to tell a caller for whom there is no place."""
-
-    places: int
-    retry_after_s: float
 
 
 class JobStore(JobReader):
@@ -80,6 +76,11 @@ class JobStore(JobReader):
         By kind of job, the fields of the payload that go when it ends.
     clock
         Of the service; None: a new one.
+
+    Attributes
+    ----------
+    unfinished
+        The results that are completed after their job's end.
     """
 
     def __init__(
@@ -94,6 +95,7 @@ class JobStore(JobReader):
         self._owner = owner
         self._max_attempts = max_attempts
         self._dropped_fields = dropped_fields
+        self.unfinished = UnfinishedResults(self, owner, max_attempts)
 
     def migrate(self) -> None:
         """Make the tables, or bring them to this version."""
@@ -167,6 +169,7 @@ class JobStore(JobReader):
                 "finished_at": None,
                 "request_id": request_id,
                 "key_id": key_id,
+                "unfinished": None,
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
@@ -205,32 +208,28 @@ class JobStore(JobReader):
             .with_for_update(skip_locked=True)
             .scalar_subquery()
         )
-        return self._take(jobs.c.number == oldest)
+        return next(iter(self._take(jobs.c.number == oldest)), None)
 
-    def claim_this(self, job_id: str) -> Claim | None:
-        """Take a job out of its turn; None if it does not wait."""
-        return self._take(jobs.c.id == job_id)
+    def claim_these(self, job_ids: Sequence[str]) -> list[Claim]:
+        """Take jobs out of their turn; those that wait, in the order of their deadlines."""
+        claims = self._take(jobs.c.id.in_(job_ids))
+        return sorted(claims, key=lambda claim: claim.deadline or 0.0)
 
-    def _take(self, which: sa.ColumnElement[bool]) -> Claim | None:
+    def _take(self, which: sa.ColumnElement[bool]) -> list[Claim]:
         with self._database.write() as connection:
             now = self._now(connection)
-            take = (
-                sa.update(jobs)
-                .where(which, jobs.c.status == JobStatus.QUEUED)
-                .values(
-                    status=JobStatus.RUNNING,
-                    attempt=jobs.c.attempt + 1,
-                    owner=self._owner,
-                    # An earlier process may have had another idea of the time.
-                    started_at=sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now),
-                )
-                .returning(jobs)
-            )
-            row = connection.execute(take).mappings().first()
-            return None if row is None else claim_of(row, self._ahead(connection))
+            rows = connection.execute(take(which, self._owner, now)).mappings().all()
+            ahead = self._ahead(connection)
+        return [claim_of(row, ahead) for row in rows]
 
     def succeed(
-        self, job_id: str, attempt: int, work: WorkResult, progress: Progress, on_success: OnSuccess | None
+        self,
+        job_id: str,
+        attempt: int,
+        work: WorkResult,
+        progress: Progress,
+        on_success: OnSuccess | None,
+        follow_up: FollowUp | None = None,
     ) -> Job | None:
         """Store what the work returned; the job has succeeded, or is cancelled if that was asked for.
 
@@ -249,10 +248,14 @@ class JobStore(JobReader):
                 result = on_success(connection, job_of(row), work)
             if work.artifact is not None:
                 connection.execute(sa.insert(artifacts).values(job_id=job_id, data=work.artifact))
+            unfinished = False
+            if work.unfinished and follow_up is not None:
+                unfinished = not cancelled and has_place(connection)
+                result = result if unfinished else {**result, **follow_up.given_up}
             if cancelled:
                 return self._end(connection, row, JobStatus.CANCELLED, progress, result=result)
             done = replace(progress, fraction=1.0)
-            return self._end(connection, row, JobStatus.SUCCEEDED, done, result=result)
+            return self._end(connection, row, JobStatus.SUCCEEDED, done, result=result, unfinished=unfinished)
 
     def fail(self, job_id: str, attempt: int, error: dict[str, Any], progress: Progress) -> Job | None:
         """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
@@ -272,12 +275,17 @@ class JobStore(JobReader):
             row = find_attempt(connection, job_id, attempt)
             return None if row is None else self._lose(connection, row, reason, progress)
 
-    def release(self, job_id: str, attempt: int, progress: Progress) -> Job | None:
-        """Put a job back into the queue that was stopped through no fault of its own."""
+    def release(self, job_id: str, attempt: int, progress: Progress | None) -> Job | None:
+        """Put a job back into the queue that was stopped through no fault of its own.
+
+        Without a progress it keeps the one that is stored.
+        """
         with self._database.write() as connection:
             row = find_attempt(connection, job_id, attempt)
             if row is None:
                 return None
+            if progress is None:
+                progress = progress_of(row)
             if row["cancel_requested"]:
                 return self._end(connection, row, JobStatus.CANCELLED, progress)
             return requeue(connection, row, row["losses"], progress)

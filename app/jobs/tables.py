@@ -34,6 +34,8 @@ jobs = sa.Table(
     sa.Column("created_at", sa.Double, nullable=False),
     sa.Column("started_at", sa.Double),
     sa.Column("finished_at", sa.Double),
+    # Of a result that is to be completed after the job's end, the tries in vain; null for all others.
+    sa.Column("unfinished", sa.Integer),
     # The id of the request that it came with, and of the API key of that request.
     sa.Column("request_id", sa.String(128)),
     sa.Column("key_id", sa.String(64)),
@@ -45,6 +47,13 @@ jobs = sa.Table(
     sa.Index("ix_jobs_finished_at", "finished_at"),
     sa.Index("ix_jobs_status_number", "status", "number"),
     sa.Index("ix_jobs_status_lane_number", "status", "lane", "number"),
+    sa.Index(
+        "ix_jobs_unfinished",
+        "unfinished",
+        "number",
+        sqlite_where=sa.text("unfinished IS NOT NULL"),
+        postgresql_where=sa.text("unfinished IS NOT NULL"),
+    ),
     sqlite_autoincrement=True,
 )
 

@@ -66,6 +66,22 @@ def queued_of_other_kinds(kinds: Iterable[str]) -> sa.Select[Any]:
     return select_jobs.where(jobs.c.status == JobStatus.QUEUED, jobs.c.kind.not_in(list(kinds)))
 
 
+def take(which: sa.ColumnElement[bool], owner: str, now: float) -> sa.Executable:
+    """Let an owner have those of some jobs that wait, and return them."""
+    return (
+        sa.update(jobs)
+        .where(which, jobs.c.status == JobStatus.QUEUED)
+        .values(
+            status=JobStatus.RUNNING,
+            attempt=jobs.c.attempt + 1,
+            owner=owner,
+            # An earlier process may have had another idea of the time.
+            started_at=sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now),
+        )
+        .returning(jobs)
+    )
+
+
 def end(
     connection: Connection,
     row: RowMapping,
@@ -76,11 +92,17 @@ def end(
     result: dict[str, Any] | None = None,
     error: dict[str, Any] | None = None,
     dropped: Set[str] = frozenset(),
+    unfinished: bool = False,
 ) -> Job:
     """Move a job to a final state, its payload without the dropped fields."""
     # An earlier process may have had another idea of the time.
     finished_at = max(now, row["started_at"] or row["created_at"])
-    values: dict[str, Any] = {"result": result, "error": error, "finished_at": finished_at}
+    values: dict[str, Any] = {
+        "result": result,
+        "error": error,
+        "finished_at": finished_at,
+        "unfinished": 0 if unfinished else None,
+    }
     if dropped:
         values["payload"] = {name: value for name, value in row["payload"].items() if name not in dropped}
     return change(connection, row, status, progress, **values)
@@ -155,6 +177,7 @@ def _summary(row: RowMapping | dict[str, Any]) -> dict[str, Any]:
         "started_at": _time(row["started_at"]),
         "finished_at": _time(row["finished_at"]),
         "has_artifact": bool(row["has_artifact"]),
+        "unfinished": row["unfinished"] is not None,
         "request_id": row["request_id"],
         "key_id": row["key_id"],
     }

@@ -49,7 +49,7 @@ class Waiting:
         """Take note of one more job, and tell the others who could take it."""
         self._lanes.waiting[job.lane] += 1
         if self._last_minute is not None and deadline is not None and self._answered_at_once(job.kind):
-            self._last_minute.watch(job.id, deadline)
+            self._last_minute.watch(job.id, deadline, self._kinds[job.kind].effort(job.payload))
         self._company.tell_waiting(job.lane)
         self._wake.set()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import time
 from collections.abc import Callable
@@ -12,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from app.domain.errors import NoCompatibleSource
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_to_record
 from app.jobs import bounding, work
+from app.jobs.answer_time import BOUND
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
@@ -32,13 +35,21 @@ _PRELOAD = "app.learning.source_policies:preload"
 _LARGEST_TRIED = (1000, 2000)
 """UAVs and areas of the problem on which the warm-up tries how long answers take, at most."""
 
-_OVERRUNS_TIMED = {
-    **dict.fromkeys(("ga", "local_search", "auto", "exact"), _LARGEST_TRIED),
-    "qmix": (100, 300),
-}
-"""Algorithms whose preparations are timed by the warm-up, and at what size at most."""
+_LARGEST_LEARNED = (100, 300)
+"""The same of those that learn: what they do before they can be stopped takes seconds where UAVs are many."""
 
-_ALONE = protocol.SolverContext()
+_TRIED = {
+    "ga": (_LARGEST_TRIED,),
+    "local_search": (_LARGEST_TRIED,),
+    "auto": (_LARGEST_TRIED,),
+    "exact": (_LARGEST_TRIED,),
+    "qmix": (_LARGEST_LEARNED, (150, 1), (1, 2000)),
+    "transfer_qmix": (_LARGEST_LEARNED, (150, 1), (1, 2000)),
+}
+"""Algorithms whose preparations are timed by the warm-up, and on how many UAVs and areas at most: on the
+largest, and where there is much of the one and little of the other."""
+
+_ANSWERS_TIMED = 3
 
 _PARAMETERS: dict[str, dict[str, Any]] = {
     "greedy": {},
@@ -75,14 +86,54 @@ def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | Non
     if library_url is not None:
         resolve(_PRELOAD)(library_url, _small_problem())
     _time_answers(most_uavs, most_targets)
-    for algorithm, most in _OVERRUNS_TIMED.items():
-        large = _large_problem(min(most_uavs, most[0]), min(most_targets, most[1]))
-        solver = create_solver(algorithm, parse_parameters(algorithm, {}), _ALONE)
-        for _ in range(2):
-            begun = time.perf_counter()
-            solver.solve(large, 0, Deadline(0.0), lambda _progress: None)
-            overrun = time.perf_counter() - begun
-        work.answer_time.overran(algorithm, large, overrun)
+    means = protocol.SolverContext(library_url)
+    for algorithm, sizes in _TRIED.items():
+        for m, n in sizes:
+            _time_preparations(algorithm, _large_problem(min(most_uavs, m), min(most_targets, n)), means)
+
+    _time_bound(_large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1])))
+
+
+def _time_bound(problem: Problem) -> None:
+    """Know how long the bound takes before it can be stopped."""
+    took = []
+    for _ in range(2):
+        asked = _NotAtOnce()
+        begun = time.perf_counter()
+        bounding.bound_answer(problem, 0.0, 1.0, asked)
+        took.append(time.perf_counter() - begun)
+    work.answer_time.preparations.tried(BOUND, problem, min(took))
+
+
+class _NotAtOnce:
+    """Says stop whenever it is asked but for the first time."""
+
+    def __init__(self) -> None:
+        self._asked = False
+
+    def __call__(self) -> bool:
+        """See :class:`~app.solvers.protocol.StopCriterion`."""
+        asked, self._asked = self._asked, True
+        return asked
+
+    def seconds_left(self) -> float:
+        """Return infinity: there is no time limit."""
+        return math.inf
+
+
+def _time_preparations(algorithm: str, problem: Problem, means: protocol.SolverContext) -> None:
+    """Know how long an algorithm takes that is told to stop from the beginning."""
+    solver = create_solver(algorithm, parse_parameters(algorithm, {}), means)
+    took = []
+    for _ in range(2):
+        begun = time.perf_counter()
+        try:
+            solver.solve(problem, 0, Deadline(0.0), lambda _progress: None)
+        except NoCompatibleSource:
+            # A library may be empty, and jobs are then refused as quickly.
+            return
+        took.append(time.perf_counter() - begun)
+    work.answer_time.preparations.tried(algorithm, problem, min(took))
 
 
 def compile_all(processes: int) -> None:
@@ -155,12 +206,16 @@ def _time_answers(most_uavs: int, most_targets: int) -> None:
     longer to find it than all the work takes that is done in it.
     """
     largest = _large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1]))
-    request = _request(largest, "greedy", {})
-    work.allocate_at_once(request, _unlimited())
-    work.answer_time.forget()
-    for _ in range(3):
+    planned = replace(largest, objective=replace(largest.objective, unloading="planned"))
+    requests = [_request(problem, "greedy", {}) for problem in (largest, planned)]
+    for request in requests:
         work.allocate_at_once(request, _unlimited())
-        work.allocate_at_once(request, WorkContext.in_process(_untold, time_limit_s=0.0))
+    work.answer_time.forget()
+    for request in requests:
+        for _ in range(_ANSWERS_TIMED):
+            work.allocate_at_once(request, _unlimited())
+    # With the reasons too.
+    work.allocate(requests[0], _unlimited())
 
 
 def _small_problem() -> Problem:

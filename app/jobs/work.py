@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
@@ -16,13 +15,17 @@ from app.domain.records import problem_from_record, to_record
 from app.domain.warnings import problem_warnings
 from app.jobs import bounding
 from app.jobs.answer_time import AnswerTime
+from app.jobs.explaining import PENDING, REASONS, account_of
+from app.jobs.found import BestKnown, Found, best_known
 from app.jobs.model import Progress, WorkResult
 from app.jobs.time_limit import TimeLimit
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
-from app.simulation.explain import explain
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
+from app.solvers.stop import Deadline
+
+_GREEDY = "greedy"
 
 _VERIFY = "app.learning.checkpoint:verify"
 """Named, as the algorithms are, so that this room does not depend on the learners."""
@@ -39,7 +42,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
         ``problem`` (a record), ``algorithm``, ``parameters``, ``seed``, ``library_url``, the database
         with the source policies, ``threads``, how many cores to keep busy, and ``bound_time_limit_s``, how
         long to look for a bound, where one is asked for; ``run_time_limit_s`` where time counts from here;
-        ``keep_checkpoint``, whether to keep what is learned.
+        ``keep_checkpoint``, whether to keep what is learned; and of a job that was begun before
+        :data:`~app.jobs.model.BEST_KNOWN`, which the answer is not below.
     context
         Where progress goes. When it says stop, the best plan so far is the result.
 
@@ -57,22 +61,23 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     if "run_time_limit_s" in payload:
         context.end_within(payload["run_time_limit_s"])
     problem = problem_from_record(payload["problem"])
-    algorithm, seed = payload["algorithm"], payload["seed"]
+    algorithm, known = payload["algorithm"], best_known(problem, payload)
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
     if limit.leaves_none_for(algorithm):
-        return _at_once(problem, payload, limit, context)
-    solver = create_solver(
-        algorithm, parse_parameters(algorithm, payload["parameters"], stored=True), _means(payload, context)
-    )
-    solution = solver.solve(problem, seed, limit.searching, _report(context))
+        return _result(problem, _stand_in(problem, payload, limit, context), payload, limit)
+    parameters = parse_parameters(algorithm, payload["parameters"], stored=True)
+    solver = create_solver(algorithm, parameters, _means(payload, context))
+    report = _report(context, algorithm, known)
+    solution = solver.solve(problem, payload["seed"], limit.searching, report)
     limit.searched(algorithm)
-    return _result(problem, solution, payload, limit)
+    return _result(problem, Found(solution, algorithm).or_better(problem, known), payload, limit)
 
 
 def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResult:
-    """Answer a request whose time is up before a worker was free for it: by the plan of the greedy rule.
+    """Answer a request whose time is up before a worker was free for it.
 
-    Needs no torch, so a process that does nothing else is light and soon ready.
+    The plan is the greedy rule's, or the best one of an earlier attempt. It needs no torch, so a process that
+    does nothing else is light and soon ready. Others may wait for it: what can be left out is not looked for.
 
     Parameters
     ----------
@@ -87,15 +92,47 @@ def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResul
     """
     problem = problem_from_record(payload["problem"])
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
-    return _at_once(problem, payload, limit, context)
+    limit.leave_out_what_can_be()
+    return _result(problem, _stand_in(problem, payload, limit, context), payload, limit)
 
 
-def _at_once(problem: Problem, payload: dict[str, Any], limit: TimeLimit, context: WorkContext) -> WorkResult:
-    """The greedy rule's plan, as far as it comes, in the name of the algorithm that was asked for."""
-    greedy = create_solver("greedy", parse_parameters("greedy", {}), _means(payload, context))
-    solution = greedy.solve(problem, payload["seed"], limit.bounding, _report(context))
+def complete_reasons(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+    """Find the reasons for unmet needs that an answer had no time for.
+
+    Parameters
+    ----------
+    payload
+        As :func:`allocate` takes it, and ``result``, what it has returned.
+    context
+        Cancelled, it ends without them.
+
+    Returns
+    -------
+    WorkResult
+        The fields of the answer that change; unfinished where it was cancelled.
+    """
+    problem = problem_from_record(payload["problem"])
+    plan = Plan(tuple(map(tuple, payload["result"]["assignment"])))
+    found = account_of(problem, plan, context.cancelled, answer_time).fields
+    changed = {name: found[name] for name in ("unmet", REASONS)}
+    return WorkResult(changed, unfinished=found[REASONS] == PENDING)
+
+
+def _stand_in(problem: Problem, payload: dict[str, Any], limit: TimeLimit, context: WorkContext) -> Found:
+    """Return the greedy rule's plan, as far as it comes, or a better one that is known."""
+    known = best_known(problem, payload)
+    tell = _report(context, _GREEDY, known)
+
+    def report(progress: protocol.Progress) -> None:
+        limit.had_a_plan()
+        tell(progress)
+
+    greedy = create_solver(_GREEDY, parse_parameters(_GREEDY, {}), _means(payload, context))
+    limit.stand_in(_GREEDY)
+    solution = greedy.solve(problem, payload["seed"], limit.standing_in, report)
+    limit.stood_in(_GREEDY)
     asked = parse_parameters(payload["algorithm"], payload["parameters"], stored=True)
-    return _result(problem, replace(solution, parameters=asked), payload, limit)
+    return Found(replace(solution, parameters=asked), _GREEDY).or_better(problem, known)
 
 
 def _means(payload: dict[str, Any], context: WorkContext) -> protocol.SolverContext:
@@ -104,24 +141,33 @@ def _means(payload: dict[str, Any], context: WorkContext) -> protocol.SolverCont
     return protocol.SolverContext(payload["library_url"], threads, lambda: threads * (context.share() - 1))
 
 
-def _result(
-    problem: Problem, solution: protocol.Solution, payload: dict[str, Any], limit: TimeLimit
-) -> WorkResult:
-    answer = _explained(problem, solution.plan, limit)
+def _result(problem: Problem, found: Found, payload: dict[str, Any], limit: TimeLimit) -> WorkResult:
+    solution = found.solution
+    account = account_of(problem, solution.plan, limit.hurries, answer_time)
+    limit.traced(account.size)
     source = solution.source_policy
-    bound_limit_s = payload.get("bound_time_limit_s")
     result = {
         "algorithm": payload["algorithm"],
+        "answered_by": found.answered_by,
         "parameters": solution.parameters.model_dump(mode="json"),
         "seed": payload["seed"],
-        **answer,
+        **account.fields,
         "warnings": to_record(problem_warnings(problem)),
         "proof": bounding.proof_answer(problem, solution.proof),
-        **bounding.bound_answer(problem, answer["reward"], bound_limit_s, limit.bounding),
+        **_bound(problem, account.fields["reward"], payload.get("bound_time_limit_s"), limit),
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},
     }
-    return WorkResult(result, solution.checkpoint if payload.get("keep_checkpoint") else None)
+    checkpoint = solution.checkpoint if payload.get("keep_checkpoint") else None
+    return WorkResult(result, checkpoint, unfinished=account.fields[REASONS] == PENDING)
+
+
+def _bound(problem: Problem, reward: float, bound_limit_s: float | None, limit: TimeLimit) -> dict[str, Any]:
+    if bound_limit_s is None or limit.leaves_no_bound():
+        return bounding.bound_answer(problem, reward, bound_limit_s, Deadline(0.0))
+    answer = bounding.bound_answer(problem, reward, bound_limit_s, limit.bounding)
+    limit.bounded()
+    return answer
 
 
 def train(payload: dict[str, Any], context: WorkContext) -> WorkResult:
@@ -170,30 +216,21 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
     return WorkResult({}, checkpoint)
 
 
-def _explained(problem: Problem, plan: Plan, limit: TimeLimit) -> dict[str, Any]:
-    """Return an allocation by the field names of ``POST /allocate``, and note how long that took."""
-    hurried, begun = limit.hurries(), time.perf_counter()
-    explained = explain(problem, plan, limit.hurries)
-    found = time.perf_counter()
-    answer: dict[str, Any] = to_record(explained)
-    answer["assignment"] = answer.pop("plan")["assignment"]
-    answer_time.wrote(problem, time.perf_counter() - found)
-    if hurried:
-        answer_time.traced(problem, found - begun)
-    elif not limit.hurries():
-        answer_time.explained(problem, found - begun)
-    return answer
-
-
-def _report(context: WorkContext) -> Callable[[protocol.Progress], None]:
-    """Pass progress on; the plan is written out only when it is another one."""
+def _report(
+    context: WorkContext, algorithm: str, known: BestKnown | None
+) -> Callable[[protocol.Progress], None]:
+    """Pass progress on, never below what an earlier attempt found; a plan is written out only when it is
+    another one."""
     written: tuple[Plan, list[list[int]]] | None = None
 
     def report(progress: protocol.Progress) -> None:
         nonlocal written
-        if written is None or written[0] is not progress.incumbent:
-            written = progress.incumbent, [list(row) for row in progress.incumbent.assignment]
-        context.report(Progress(progress.fraction, progress.epoch, progress.best_reward, written[1]))
+        plan, reward, answered_by = progress.incumbent, progress.best_reward, algorithm
+        if known is not None and known.reward > reward:
+            plan, reward, answered_by = known.plan, known.reward, known.answered_by
+        if written is None or written[0] is not plan:
+            written = plan, [list(row) for row in plan.assignment]
+        context.report(Progress(progress.fraction, progress.epoch, reward, written[1], answered_by))
 
     return report
 

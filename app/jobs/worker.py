@@ -109,7 +109,9 @@ class _Equipment:
 _equipment: list[_Equipment] = []
 
 
-def initialize(pipe: Connection, control: MutableSequence[float], log_level: str | None = None) -> None:
+def initialize(
+    pipe: Connection, control: MutableSequence[float], log_level: str | None = None, niceness: int = 0
+) -> None:
     """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
 
     Parameters
@@ -120,7 +122,10 @@ def initialize(pipe: Connection, control: MutableSequence[float], log_level: str
         Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
     log_level
         What is logged at least; None: as Python does it by itself.
+    niceness
+        By how much it leaves the cores to others, as the system counts it.
     """
+    os.nice(niceness)
     if log_level is not None:
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,11 +1,13 @@
 """However short its time and whoever has the workers: an allocation with a time limit gets a plan."""
 
 import json
+import time
 
 import numpy as np
 import pytest
 from referee import replay
 
+from app.api.openapi_examples import example_problem
 from app.domain.records import problem_to_record
 from app.simulation.generator import generate
 from app.solvers.registry import ALGORITHMS
@@ -30,7 +32,7 @@ def test_a_time_that_is_up_at_once_gives_a_legal_plan(client, algorithm, unloadi
 
     assert answer.status_code == 200, answer.text
     told = answer.json()
-    assert told["algorithm"] == algorithm
+    assert (told["algorithm"], told["answered_by"]) == (algorithm, "greedy")
     assert told["reward"] > 0
     assert told["bound"] >= told["reward"]
     if unloading == "greedy":
@@ -48,9 +50,38 @@ def test_whoever_waits_is_answered_when_the_time_is_up(start_service, problem):
     answer = client.post("/allocate", json=request)
 
     assert answer.status_code == 200
-    assert sound(problem, answer.json()) > 0
+    told = answer.json()
+    assert sound(problem, told) > 0
+    assert (told["algorithm"], told["answered_by"]) == ("transfer_qmix", "greedy")
+    assert told["reasons"] == "pending"
     with client.stream("GET", f"/jobs/{later['id']}/events") as events:
         last = [json.loads(line[5:]) for line in events.iter_lines() if line.startswith("data:")][-1]
     assert last["status"] == "succeeded"
     assert client.get(f"/jobs/{holder['id']}").json()["status"] == "running"
+    assert client.get(f"/jobs/{told['job_id']}").json()["result"]["reasons"] == "pending"
+    # As soon as no worker is busy the reasons are found, and readable at the job.
     assert client.delete(f"/jobs/{holder['id']}").status_code == 202
+    completed = told
+    end = time.monotonic() + 60
+    while completed["reasons"] == "pending":
+        assert time.monotonic() < end
+        completed = client.get(f"/jobs/{told['job_id']}").json()["result"]
+    assert completed["reasons"] == "complete"
+    without = ("unmet", "reasons")
+    assert {k: v for k, v in completed.items() if k not in without} == {
+        k: v for k, v in told.items() if k not in without
+    }
+    assert [area["target_id"] for area in completed["unmet"]] == [a["target_id"] for a in told["unmet"]]
+    assert all(area["verified"] for area in completed["unmet"])
+
+
+@pytest.mark.parametrize("algorithm", ["auto", "local_search", "exact"])
+def test_within_a_limit_reasons_are_verified_and_the_algorithm_is_named(client, algorithm):
+    problem = example_problem("cyclone-idai")
+    for seed in range(3):
+        request = {**problem, "algorithm": algorithm, "seed": seed, "time_limit_s": 1.0}
+        told = client.post("/allocate", json=request).json()
+        assert told["answered_by"] == algorithm
+        assert told["reasons"] == "complete"
+        assert told["unmet"]
+        assert all(area["verified"] for area in told["unmet"])

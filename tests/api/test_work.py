@@ -16,6 +16,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Objective, Problem
 from app.domain.records import problem_from_record, problem_to_record
 from app.jobs import work
+from app.jobs.model import BEST_KNOWN
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.learning.checkpoint import encode
 from app.learning.parameters import QmixParameters
@@ -81,6 +82,67 @@ def test_time_that_is_up_stops_it():
 
     assert done.result["history"]["epoch"][-1] < 10_000_000
     replay(record(), done.result["assignment"])
+
+
+def best_plan():
+    done = work.allocate(payload("local_search", {}), WorkContext.in_process(lambda _progress: None))
+    return done.result
+
+
+def known(assignment, answered_by="local_search"):
+    return {BEST_KNOWN: {"assignment": assignment, "answered_by": answered_by, "best_reward": 1e9}}
+
+
+@pytest.mark.parametrize("answers", [work.allocate, work.allocate_at_once])
+def test_the_best_plan_of_an_earlier_attempt_is_the_least_that_is_answered(answers):
+    best = best_plan()
+    told = []
+    context = WorkContext.in_process(told.append, time_limit_s=None)
+
+    done = answers(payload("greedy", {}) | known(best["assignment"]), context).result
+
+    assert done["reward"] == pytest.approx(best["reward"])
+    assert done["reward"] == pytest.approx(replay(record(), done["assignment"])["reward"])
+    assert (done["algorithm"], done["answered_by"]) == ("greedy", "local_search")
+    assert done["history"]["reward"][-1] == pytest.approx(best["reward"])
+    # Nor does the progress fall below it.
+    assert {(each.best_reward, each.answered_by) for each in told} == {(done["reward"], "local_search")}
+
+
+def test_a_worse_plan_of_an_earlier_attempt_is_not_answered():
+    best, poor = best_plan(), payload("greedy", {})
+    poor = work.allocate(poor, WorkContext.in_process(lambda _progress: None)).result["assignment"]
+    context = WorkContext.in_process(lambda _progress: None)
+
+    done = work.allocate(payload("local_search", {}) | known(poor, "greedy"), context).result
+
+    assert (done["reward"], done["answered_by"]) == (best["reward"], "local_search")
+
+
+@pytest.mark.parametrize(
+    "assignment",
+    [
+        [],
+        [[0, 0, 0, 0]],
+        [[0, 0, 0, 0, 11]],
+        [[0, 0, 0, 0, -1]],
+        [[0, 0, 0, 0, 0.0]],
+        [[0, 0, 0, 0, True]],
+        [[10] * 5] * 6,
+        [[10, 10, 10, 10, 10], [0, 0, 0, 0, 0]],
+        "plan",
+        None,
+        7,
+        [None],
+    ],
+)
+def test_a_plan_that_is_none_is_not_answered(assignment):
+    context = WorkContext.in_process(lambda _progress: None)
+
+    done = work.allocate(payload("greedy", {}) | known(assignment), context).result
+
+    assert done["answered_by"] == "greedy"
+    replay(record(), done["assignment"])
 
 
 def test_training_is_registered_by_its_checkpoint():

@@ -64,7 +64,7 @@ def until_stopped(payload: Payload, context: WorkContext) -> WorkResult:
 
 def deaf(payload: Payload, context: WorkContext) -> WorkResult:
     """Report a plan, and then never look up again."""
-    context.report(Progress(0.75, best_reward=7.0, assignment=[[1, 0]]))
+    context.report(Progress(0.75, best_reward=7.0, assignment=[[1, 0]], answered_by="deaf"))
     threading.Event().wait()
     raise AssertionError
 
@@ -166,3 +166,22 @@ def warm_up_at_second_try() -> None:
     if not marker.exists():
         marker.touch()
         raise OSError("not yet")
+
+
+def half(payload: Payload, context: WorkContext) -> WorkResult:
+    """Return a result that is to be completed."""
+    return WorkResult({"half": 1, "rest": None}, unfinished=True)
+
+
+def other_half(payload: Payload, context: WorkContext) -> WorkResult:
+    return WorkResult({"rest": [payload["n"], payload["result"]]})
+
+
+def until_cancelled(payload: Payload, context: WorkContext) -> WorkResult:
+    """Say that it has begun; give up where that is asked for, and otherwise end when the file is there."""
+    Path(payload["begun"]).touch()
+    while not Path(payload["path"]).exists():
+        if context.cancelled():
+            return WorkResult({"rest": "too early"}, unfinished=True)
+        time.sleep(0.002)
+    return WorkResult({"rest": "all"})

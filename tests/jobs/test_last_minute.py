@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from harness import KINDS, eventually, finished, running
 
-from app.jobs.last_minute import latest_start
+from app.jobs.last_minute import Pace, Wait, due, latest_start
 from app.jobs.local import LocalExecutor
-from app.jobs.model import JobKind, JobStatus
+from app.jobs.model import BEST_KNOWN, JobKind, JobStatus
 
 HASTY = (
     *KINDS,
@@ -18,13 +18,54 @@ HASTY = (
 )
 
 
+def paced(seconds, effort=1.0, times=5):
+    pace = Pace()
+    for _ in range(times):
+        pace.took(effort, seconds)
+    return pace
+
+
 def test_the_last_of_those_that_end_together_is_in_time_too():
-    assert latest_start([100.0], [0.2]) == pytest.approx(99.8)
-    assert latest_start([100.0, 100.0, 100.0], [0.2]) == pytest.approx(99.2)
-    assert latest_start([100.0, 110.0], [0.2, 0.4]) == pytest.approx(99.6)
-    # The first is expected to take as long as the slowest, the others half as long again as the mean.
-    assert latest_start([100.0, 100.0], [0.2, 0.4]) == pytest.approx(99.15)
-    assert latest_start([100.0], []) < 100.0
+    # Each is expected to take half as long again, and the way there and back is taken once.
+    pace = paced(0.2)
+    assert latest_start([Wait(100.0)], pace) == pytest.approx(100.0 - 0.3 - 0.03)
+    assert latest_start([Wait(100.0)] * 3, pace) == pytest.approx(100.0 - 3 * 0.3 - 0.03)
+    assert latest_start([Wait(110.0), Wait(100.0)], pace) == pytest.approx(100.0 - 0.3 - 0.03)
+    assert latest_start([Wait(100.2), Wait(100.0)], pace) == pytest.approx(100.2 - 2 * 0.3 - 0.03)
+    assert latest_start([Wait(100.0)], Pace()) < 100.0
+
+
+def test_one_slow_answer_does_not_make_the_next_ones_early_and_many_do():
+    pace = paced(0.01)
+    before = pace.expected(1.0)
+    pace.took(1.0, 5.0)
+    assert pace.expected(1.0) == before
+    for _ in range(10):
+        pace.took(1.0, 5.0)
+    assert pace.expected(1.0) == 5.0
+
+
+def test_a_large_one_takes_longer_than_a_small_one_and_says_nothing_of_it():
+    pace = paced(0.01)
+    assert pace.expected(20.0) == pytest.approx(0.2)
+    pace.took(20.0, 1.0)
+    assert pace.expected(20.0) == pytest.approx(1.0)
+    assert pace.expected(1.0) == pytest.approx(0.01)
+    assert pace.expected(500.0) > 1.0
+
+
+def test_those_whose_turn_comes_meanwhile_are_answered_together_and_no_others():
+    pace = paced(0.01)
+    together = {f"job-{n}": Wait(100.0 + n / 1000) for n in range(40)}
+    now = latest_start(together.values(), pace)
+    first = due(together, pace, now)
+    assert 1 < len(first) <= 16
+    assert first == list(together)[: len(first)]
+    # One that has time may still get a worker.
+    apart = {"later": Wait(200.0), "now": Wait(100.0)}
+    assert due(apart, pace, 100.0) == ["now"]
+    # Large ones are taken one by one.
+    assert len(due({"a": Wait(100.0, 64.0), "b": Wait(100.0, 64.0)}, pace, 99.0)) == 1
 
 
 def busy(tmp_path, **settings):
@@ -111,7 +152,10 @@ def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_
             job, _ = await service.submit("stubborn", {}, time_limit_s=0.2)
             done = await finished(service, job)
             assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
-            assert done.result["echo"] == {}
+            # What answers it gets the best plan that was reported, and by whom.
+            known = done.result["echo"][BEST_KNOWN]
+            assert (known["best_reward"], known["assignment"]) == (7.0, [[1, 0]])
+            assert known["answered_by"] == "deaf"
 
     asyncio.run(scenario())
 

@@ -132,7 +132,9 @@ def _reward(arrays: ProblemArrays, actions: Actions) -> float:
 def _improve(
     incumbent: _Incumbent, rng: np.random.Generator, stop: StopCriterion, report: Report, history: History
 ) -> None:
-    """Search on from the incumbent."""
+    """Search on from the incumbent; without time, not even what the search needs is made ready."""
+    if stop():
+        return
     arrays = incumbent.arrays
     planned = new_planned_search(arrays, incumbent.plan.as_array())
     near, epoch = planned.search.near, history.epoch[-1] if history.epoch else 0

@@ -1,7 +1,7 @@
-"""Who asked for a job and in which request, its plan apart from its progress, and what is large last.
+"""Who asked for a job and in which request, results that are not complete, and what is large last.
 
 SQLite reads a row up to the last column that is asked for, so a list of jobs read all payloads and results.
-Plans of earlier jobs stay in their progress.
+Plans have a column apart from the progress; those of earlier jobs stay there.
 
 Revision ID: 0004
 """
@@ -29,14 +29,20 @@ def upgrade() -> None:
     else:
         op.add_column("jobs", sa.Column("request_id", sa.String(128)))
         op.add_column("jobs", sa.Column("key_id", sa.String(64)))
+        op.add_column("jobs", sa.Column("unfinished", sa.Integer))
         op.add_column("jobs", sa.Column("assignment", sa.JSON))
     op.create_index("ix_jobs_status_number", "jobs", ["status", "number"])
+    some = sa.text("unfinished IS NOT NULL")
+    op.create_index(
+        "ix_jobs_unfinished", "jobs", ["unfinished", "number"], sqlite_where=some, postgresql_where=some
+    )
 
 
 def downgrade() -> None:
     """Remove them; plans of unfinished jobs are lost, but for what their results have."""
+    op.drop_index("ix_jobs_unfinished", "jobs")
     op.drop_index("ix_jobs_status_number", "jobs")
-    for name in ("assignment", "key_id", "request_id"):
+    for name in ("assignment", "unfinished", "key_id", "request_id"):
         op.drop_column("jobs", name)
 
 
@@ -60,6 +66,7 @@ def _build_anew() -> None:
         sa.Column("finished_at", sa.Double),
         sa.Column("request_id", sa.String(128)),
         sa.Column("key_id", sa.String(64)),
+        sa.Column("unfinished", sa.Integer),
         sa.Column("assignment", sa.JSON),
         sa.Column("payload", sa.JSON, nullable=False),
         sa.Column("result", sa.JSON),

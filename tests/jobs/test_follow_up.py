@@ -1,0 +1,172 @@
+"""Results that are completed after the job's end: once, after restarts too, and in nobody's way."""
+
+import asyncio
+import time
+from pathlib import Path
+
+import pytest
+from harness import KINDS, eventually, finished, running
+
+from app.jobs.local import LocalExecutor
+from app.jobs.model import JobKind, JobStatus, Progress, WorkResult
+from app.jobs.store import JobStore, QueueLimit
+from app.jobs.unfinished import UnfinishedResults
+from policy_store.database import Database
+
+LATER = (
+    *KINDS,
+    JobKind("later", "job_work:half", "interactive", follow_up="job_work:other_half"),
+    JobKind("never", "job_work:half", "interactive", follow_up="job_work:die"),
+    JobKind("interrupted", "job_work:half", "interactive", follow_up="job_work:until_cancelled"),
+    JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:echo"),
+)
+HALF = {"half": 1, "rest": None}
+
+
+def service(tmp_path, **settings):
+    return running(tmp_path, kinds=LATER, reserve=LocalExecutor(1), **settings)
+
+
+async def completed(service, job):
+    await finished(service, job)
+
+    async def is_so() -> bool:
+        return not (await service.get(job.id)).unfinished
+
+    await eventually(is_so)
+    return await service.get(job.id)
+
+
+def test_a_result_is_completed_after_the_answer(tmp_path):
+    async def scenario():
+        async with service(tmp_path) as jobs:
+            job, _ = await jobs.submit("later", {"n": 7})
+            answered = await finished(jobs, job)
+            assert (answered.result, answered.unfinished) == (HALF, True)
+            done = await completed(jobs, job)
+            assert done.status is JobStatus.SUCCEEDED
+            assert done.result == {"half": 1, "rest": [7, HALF]}
+            assert done.attempt == 1
+
+    asyncio.run(scenario())
+
+
+def test_a_restart_completes_what_was_left(tmp_path):
+    async def scenario():
+        # Nothing completes it here.
+        async with running(tmp_path, kinds=LATER) as jobs:
+            job, _ = await jobs.submit("later", {"n": 7})
+            assert (await finished(jobs, job)).unfinished
+        async with service(tmp_path) as jobs:
+            assert (await completed(jobs, job)).result["rest"] == [7, HALF]
+
+    asyncio.run(scenario())
+
+
+def test_what_cannot_be_completed_stays_as_it_is_and_holds_up_no_other(tmp_path):
+    async def scenario():
+        async with service(tmp_path) as jobs:
+            bad, _ = await jobs.submit("never", {"log": str(tmp_path / "deaths"), "deaths": 99})
+            good, _ = await jobs.submit("later", {"n": 1})
+            assert (await completed(jobs, good)).result["rest"] == [1, HALF]
+            assert (await completed(jobs, bad)).result == HALF
+            assert len((tmp_path / "deaths").read_text().splitlines()) == 3
+            assert (await jobs.get(bad.id)).status is JobStatus.SUCCEEDED
+
+    asyncio.run(scenario())
+
+
+def test_it_makes_way_for_an_answer_and_is_begun_anew(tmp_path):
+    async def scenario():
+        gate, begun = str(tmp_path / "gate"), Path(tmp_path / "begun")
+        async with service(tmp_path) as jobs:
+            slow, _ = await jobs.submit("interrupted", {"begun": str(begun), "path": gate})
+            assert (await finished(jobs, slow)).unfinished
+            await eventually(begun.exists)
+            # Both have no worker: the one that runs waits for the gate.
+            await jobs.submit("until_file", {"path": gate})
+            hasty, _ = await jobs.submit("hasty", {"path": gate}, time_limit_s=0.0)
+            assert (await finished(jobs, hasty)).result["echo"] == hasty.payload
+            assert (await jobs.get(slow.id)).unfinished
+            Path(gate).touch()
+            assert (await completed(jobs, slow)).result["rest"] == "all"
+
+    asyncio.run(scenario())
+
+
+@pytest.fixture
+def table(any_database_url):
+    database = Database(any_database_url)
+    store = JobStore(database, "host:1:1:me", 3)
+    store.migrate()
+    yield store, UnfinishedResults(database, "host:1:1:me", 3)
+    database.dispose()
+
+
+def ended(store, *, cancel=False, unfinished=True):
+    kind = JobKind("later", "nowhere:later", "interactive")
+    claim, _ = store.insert(kind, {}, run_now=True, limit=QueueLimit(1, 1.0))
+    if cancel:
+        store.cancel(claim.job.id)
+    return store.succeed(claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress(), None)
+
+
+def test_only_results_that_wait_for_it_are_completed(table):
+    store, results = table
+    whole, cancelled, half = (
+        ended(store, unfinished=False),
+        ended(store, cancel=True),
+        ended(store),
+    )
+    assert (whole.unfinished, cancelled.unfinished, half.unfinished) == (False, False, True)
+    assert results.next(time.time()).id == half.id
+    for job in (whole, cancelled):
+        assert not results.complete(job.id, 1, {"rest": 2})
+        assert store.get(job.id).result == HALF
+    assert not results.complete(half.id, 2, {"rest": 2})
+    assert results.complete(half.id, 1, {"rest": 2})
+    assert store.get(half.id).result == {"half": 1, "rest": 2}
+    # The second to come changes nothing.
+    assert not results.complete(half.id, 1, {"rest": 3})
+    assert store.get(half.id).result == {"half": 1, "rest": 2}
+    assert results.next(time.time()) is None
+
+
+def test_a_deleted_job_is_not_completed(table):
+    store, results = table
+    job = ended(store)
+    store.expire(time.time() + 1.0, 10)
+    assert not results.complete(job.id, 1, {"rest": 2})
+    results.failed(job.id, 1)
+    assert results.next(time.time()) is None
+
+
+def test_those_that_failed_come_last_and_then_no_more(table):
+    store, results = table
+    first, second = ended(store), ended(store)
+    results.failed(first.id, 1)
+    assert results.next(time.time()).id == second.id
+    for _ in range(2):
+        results.failed(first.id, 1)
+    assert not store.get(first.id).unfinished
+    assert results.complete(second.id, 1, {})
+    assert results.next(time.time()) is None
+
+
+def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
+    store, results = table
+    monkeypatch.setattr("app.jobs.unfinished._MOST", 2)
+    assert [ended(store).unfinished for _ in range(3)] == [True, True, False]
+    assert results.complete(results.next(time.time()).id, 1, {})
+    assert ended(store).unfinished
+
+
+def test_services_that_share_a_database_complete_their_own_first(postgresql):
+    database = Database(postgresql.new_database())
+    store = JobStore(database, "host:1:1:me", 3)
+    store.migrate()
+    job = ended(store)
+    other = UnfinishedResults(database, "host:2:2:other", 3)
+    assert other.next(time.time()) is None
+    assert other.next(time.time() + 61.0).id == job.id
+    database.dispose()
