@@ -8,16 +8,19 @@ import pytest
 from harness import KINDS, eventually, finished, running
 
 from app.jobs.local import LocalExecutor
-from app.jobs.model import JobKind, JobStatus, Progress, WorkResult
+from app.jobs.model import FollowUp, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore, QueueLimit
-from app.jobs.unfinished import UnfinishedResults
 from policy_store.database import Database
 
+GIVEN_UP = {"rest": "never"}
+OTHER_HALF = FollowUp("job_work:other_half", GIVEN_UP)
 LATER = (
     *KINDS,
-    JobKind("later", "job_work:half", "interactive", follow_up="job_work:other_half"),
-    JobKind("never", "job_work:half", "interactive", follow_up="job_work:die"),
-    JobKind("interrupted", "job_work:half", "interactive", follow_up="job_work:until_cancelled"),
+    JobKind("later", "job_work:half", "interactive", follow_up=OTHER_HALF),
+    JobKind("never", "job_work:half", "interactive", follow_up=FollowUp("job_work:die", GIVEN_UP)),
+    JobKind(
+        "interrupted", "job_work:half", "interactive", follow_up=FollowUp("job_work:until_cancelled", {})
+    ),
     JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:echo"),
 )
 HALF = {"half": 1, "rest": None}
@@ -69,7 +72,7 @@ def test_what_cannot_be_completed_stays_as_it_is_and_holds_up_no_other(tmp_path)
             bad, _ = await jobs.submit("never", {"log": str(tmp_path / "deaths"), "deaths": 99})
             good, _ = await jobs.submit("later", {"n": 1})
             assert (await completed(jobs, good)).result["rest"] == [1, HALF]
-            assert (await completed(jobs, bad)).result == HALF
+            assert (await completed(jobs, bad)).result == HALF | GIVEN_UP
             assert len((tmp_path / "deaths").read_text().splitlines()) == 3
             assert (await jobs.get(bad.id)).status is JobStatus.SUCCEEDED
 
@@ -99,7 +102,7 @@ def table(any_database_url):
     database = Database(any_database_url)
     store = JobStore(database, "host:1:1:me", 3)
     store.migrate()
-    yield store, UnfinishedResults(database, "host:1:1:me", 3)
+    yield store, store.unfinished
     database.dispose()
 
 
@@ -108,7 +111,9 @@ def ended(store, *, cancel=False, unfinished=True):
     claim, _ = store.insert(kind, {}, run_now=True, limit=QueueLimit(1, 1.0))
     if cancel:
         store.cancel(claim.job.id)
-    return store.succeed(claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress(), None)
+    return store.succeed(
+        claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress(), None, OTHER_HALF
+    )
 
 
 def test_only_results_that_wait_for_it_are_completed(table):
@@ -119,17 +124,17 @@ def test_only_results_that_wait_for_it_are_completed(table):
         ended(store),
     )
     assert (whole.unfinished, cancelled.unfinished, half.unfinished) == (False, False, True)
-    assert results.next(time.time()).id == half.id
-    for job in (whole, cancelled):
+    assert results.next().id == half.id
+    for job, result in ((whole, HALF), (cancelled, HALF | GIVEN_UP)):
         assert not results.complete(job.id, 1, {"rest": 2})
-        assert store.get(job.id).result == HALF
+        assert store.get(job.id).result == result
     assert not results.complete(half.id, 2, {"rest": 2})
     assert results.complete(half.id, 1, {"rest": 2})
     assert store.get(half.id).result == {"half": 1, "rest": 2}
     # The second to come changes nothing.
     assert not results.complete(half.id, 1, {"rest": 3})
     assert store.get(half.id).result == {"half": 1, "rest": 2}
-    assert results.next(time.time()) is None
+    assert results.next() is None
 
 
 def test_a_deleted_job_is_not_completed(table):
@@ -137,36 +142,42 @@ def test_a_deleted_job_is_not_completed(table):
     job = ended(store)
     store.expire(time.time() + 1.0, 10)
     assert not results.complete(job.id, 1, {"rest": 2})
-    results.failed(job.id, 1)
-    assert results.next(time.time()) is None
+    results.failed(job.id, 1, GIVEN_UP)
+    assert results.next() is None
 
 
 def test_those_that_failed_come_last_and_then_no_more(table):
     store, results = table
     first, second = ended(store), ended(store)
-    results.failed(first.id, 1)
-    assert results.next(time.time()).id == second.id
-    for _ in range(2):
-        results.failed(first.id, 1)
+    results.failed(first.id, 1, GIVEN_UP)
+    assert results.next().id == second.id
+    results.failed(first.id, 1, GIVEN_UP)
+    assert store.get(first.id).result == HALF
+    results.failed(first.id, 1, GIVEN_UP)
     assert not store.get(first.id).unfinished
+    assert store.get(first.id).result == HALF | GIVEN_UP
     assert results.complete(second.id, 1, {})
-    assert results.next(time.time()) is None
+    assert results.next() is None
 
 
 def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
     store, results = table
     monkeypatch.setattr("app.jobs.unfinished._MOST", 2)
-    assert [ended(store).unfinished for _ in range(3)] == [True, True, False]
-    assert results.complete(results.next(time.time()).id, 1, {})
+    first, second, third = ended(store), ended(store), ended(store)
+    assert [each.unfinished for each in (first, second, third)] == [True, True, False]
+    assert third.result == HALF | GIVEN_UP
+    assert results.complete(results.next().id, 1, {})
     assert ended(store).unfinished
 
 
-def test_services_that_share_a_database_complete_their_own_first(postgresql):
+def test_services_that_share_a_database_complete_their_own_first(postgresql, monkeypatch):
     database = Database(postgresql.new_database())
     store = JobStore(database, "host:1:1:me", 3)
     store.migrate()
     job = ended(store)
-    other = UnfinishedResults(database, "host:2:2:other", 3)
-    assert other.next(time.time()) is None
-    assert other.next(time.time() + 61.0).id == job.id
+    other = JobStore(database, "host:2:2:other", 3).unfinished
+    assert other.next() is None
+    assert store.unfinished.next().id == job.id
+    monkeypatch.setattr("app.jobs.unfinished._LEFT_ALONE_S", 0.0)
+    assert other.next().id == job.id
     database.dispose()
