@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field
 
 from app.api.allocation_models import Allocation, AllocationRequest, AnswerModel
+from app.api.errors import BatchTooLarge
 from app.api.problem_models import Identifier, WireModel
+from app.settings import Settings
 
 
 class BatchItem(AllocationRequest):
@@ -19,6 +22,10 @@ class BatchItem(AllocationRequest):
     )
     id: Identifier | None = Field(default=None, description="Comes back with the answer; need not be unique")
 
+    @classmethod
+    def require_sizes(cls, body: Mapping[str, Any], settings: Settings, at: str) -> None:
+        """Let it be: a problem that is too large is told in its line, and refuses no batch."""
+
 
 class BatchRequest(WireModel):
     """Allocations that have nothing to do with one another."""
@@ -26,6 +33,19 @@ class BatchRequest(WireModel):
     problems: list[BatchItem] = Field(
         min_length=1, description="As many bodies of `POST /allocate` as the operator takes"
     )
+
+    @classmethod
+    def require_sizes(cls, body: Mapping[str, Any], settings: Settings, at: str) -> None:  # noqa: ARG003 - of all models
+        """Refuse a batch that is too large before its problems are looked at.
+
+        Raises
+        ------
+        BatchTooLarge
+            If it has more problems than the operator takes.
+        """
+        problems, limit = body.get("problems"), settings.batch_limit
+        if isinstance(problems, list) and len(problems) > limit:
+            raise BatchTooLarge(limit, len(problems))
 
 
 class BatchLine(AnswerModel):

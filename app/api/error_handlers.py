@@ -17,17 +17,15 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import compile_path
 
-from app.api.errors import RequestError
+from app.api.errors import InvalidBody, RequestError
 from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
 from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
+from app.field_errors import in_words
 from app.jobs import errors as job_errors
 from policy_store import errors as store_errors
 
 _log = logging.getLogger(__name__)
-
-FORM_TAG = "form:"
-"""Begins the tags that tell the forms of a body apart; they are no part of a pointer."""
 
 _CODES: Mapping[type[Exception], str] = {
     job_errors.JobNotFound: "job-not-found",
@@ -94,24 +92,14 @@ def _instance(request: Request) -> str:
 
 def _invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    errors = [_field_error(item) for item in error.errors()]
-    first = errors[0]
-    where = first.parameter or first.pointer or "the body"
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return problem_response(
-        "invalid-request", f"{where}: {first.detail}{more}", _instance(request), errors=errors
-    )
+    return _request_error(request, InvalidBody([_parameter_error(item) for item in error.errors()]))
 
 
-def _field_error(item: Mapping[str, Any]) -> FieldError:
+def _parameter_error(item: Mapping[str, Any]) -> FieldError:
+    """Say what is wrong outside of the body, which is checked by :mod:`app.api.body_validation`."""
     place, *location = item["loc"]
-    detail = item["msg"]
-    if place != "body":
-        name = "/".join(map(str, location))
-        return FieldError(pointer="", detail=f"{place} parameter: {detail}", parameter=name)
-    steps = [str(step) for step in location if not str(step).startswith(FORM_TAG)]
-    pointer = "".join("/" + step.replace("~", "~0").replace("/", "~1") for step in steps)
-    return FieldError(pointer=pointer, detail=detail)
+    name = "/".join(map(str, location))
+    return FieldError(pointer="", detail=f"{place} parameter: {in_words(item)}", parameter=name)
 
 
 def _http_error(request: Request, error: Exception) -> Response:

@@ -2,6 +2,7 @@
 
 RequestError
  ├─ MalformedJson           the body is no JSON
+ ├─ InvalidBody             the body's fields are not those of the request
  ├─ UnsupportedMediaType    the body is not sent as JSON
  ├─ UnsupportedContentEncoding  the body is sent compressed
  ├─ BodyTooLarge            the body has more bytes than are taken
@@ -56,6 +57,30 @@ class MalformedJson(RequestError):
 
     def __init__(self, reason: str) -> None:
         super().__init__("malformed-json", f"the body is not JSON in UTF-8: {reason}")
+
+
+class InvalidBody(RequestError):
+    """The body's fields are not those of the request, or hold what they cannot.
+
+    Parameters
+    ----------
+    errors
+        At least one.
+    all_listed
+        False where the check ended before the body did.
+    built
+        How many errors the validator has made.
+    """
+
+    def __init__(self, errors: Sequence[FieldError], *, all_listed: bool = True, built: int = 0) -> None:
+        first, others = errors[0], len(errors) - 1
+        more = f" (and {'' if all_listed else 'at least '}{others} more)" if others else ""
+        super().__init__(
+            "invalid-request",
+            f"{first.parameter or first.pointer or 'the body'}: {first.detail}{more}",
+            errors=errors,
+        )
+        self.built = built
 
 
 class UnsupportedMediaType(RequestError):

@@ -1,65 +1,120 @@
-"""Request bodies: bounded while they arrive, and read as JSON to the letter."""
+"""Request bodies: bounded while they arrive, read as JSON to the letter, checked beside the event loop."""
 
 from __future__ import annotations
 
+import asyncio
+import codecs
 import json
 import time
 from collections import Counter
 from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from email.message import Message as Header
-from typing import Any
+from typing import Annotated, Any, cast
 
 from fastapi import Request
 from fastapi.routing import APIRoute
+from pydantic import BaseModel, Discriminator
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.errors import BodyTooLarge, MalformedJson, UnsupportedContentEncoding, UnsupportedMediaType
-from app.api.problem_details import problem_response
+from app.api.body_validation import BodyValidator
+from app.api.errors import (
+    BodyTooLarge,
+    InvalidBody,
+    MalformedJson,
+    UnsupportedContentEncoding,
+    UnsupportedMediaType,
+)
+from app.api.json_structure import MOST_NAMES, NestedTooDeep, UnlikelyShape, require_likely_shape
+from app.api.problem_details import FieldError, problem_response
+from app.settings import Settings
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
+_READ_AT_ONCE_BYTES = 16_384
+"""A body up to this is read in a millisecond, less than it takes to hand it over."""
+
+_SHOWN = 20
+"""Characters of a body that are shown before and after the place where it is not JSON."""
+
+_readers = ThreadPoolExecutor(2, "read-body")
+"""Read larger bodies, so that others are answered meanwhile; as few as the memory of so many is known."""
+
 
 class JsonRoute(APIRoute):
-    """A route whose body is read by :func:`parse_json`, and only if it is sent as JSON."""
+    """A route whose body is sent as JSON, and read and checked by :func:`read_body`."""
 
     def get_route_handler(self) -> Handler:
-        """Read the body before the framework does, which then finds it read."""
+        """Read the body before the framework does, which then finds its model made."""
         handle = super().get_route_handler()
         if self.body_field is None:
             return handle
+        info = self.body_field.field_info
+        choice = [each for each in info.metadata if isinstance(each, Discriminator)]
+        validator = BodyValidator(Annotated[info.annotation, choice[0]] if choice else info.annotation)
 
         async def read_and_handle(request: Request) -> Response:
-            request = _JsonRequest(request.scope, request.receive)
+            request = _CheckedRequest(request.scope, request.receive)
             try:
                 body = await request.body()
             except ClientDisconnect:
                 raise HTTPException(400, "the client has gone before the body was complete") from None
             # A time limit begins here: how long the client took to send is not in the service's hands.
             request.state.arrived_s = time.monotonic()
-            if body:
-                _require_json(request.headers.get("content-type", ""))
-                _require_plain(request.headers.get("content-encoding", ""))
-                await request.json()
+            if not body:
+                raise InvalidBody([FieldError(pointer="", detail="is empty, needs a JSON object")])
+            _require_json(request.headers.get("content-type", ""))
+            _require_plain(request.headers.get("content-encoding", ""))
+            settings = cast(Settings, request.app.state.services.settings)
+            request.checked = await read_in_turn(body, validator, settings)
             return await handle(request)
 
         return read_and_handle
 
 
-class _JsonRequest(Request):
-    """Keeps what was parsed, so it is done once."""
+class _CheckedRequest(Request):
+    """Has the model of its body for JSON, so that the framework finds nothing left to check."""
+
+    checked: BaseModel
 
     async def json(self) -> Any:
-        if not hasattr(self, "_json"):
-            self._json = parse_json(await self.body())
-        return self._json
+        return self.checked
+
+
+async def read_in_turn(body: bytes, validator: BodyValidator, settings: Settings) -> BaseModel:
+    """Do what :func:`read_body` does; a large body is read by another thread than the event loop's."""
+    if len(body) <= _READ_AT_ONCE_BYTES:
+        return read_body(body, validator, settings)
+    loop = asyncio.get_running_loop()
+    return await loop.run_in_executor(_readers, read_body, body, validator, settings)
+
+
+def read_body(body: bytes, validator: BodyValidator, settings: Settings) -> BaseModel:
+    """Make the model of a body; nothing is built of a body whose shape no request has.
+
+    Raises
+    ------
+    MalformedJson
+        If it is not JSON.
+    InvalidBody, AllocatorError, RequestError
+        As :meth:`~app.api.body_validation.BodyValidator.validate` says.
+    """
+    sizes = settings.max_uavs, settings.max_targets, settings.max_materials, settings.batch_limit
+    try:
+        require_likely_shape(body, max(sizes))
+    except NestedTooDeep as error:
+        raise MalformedJson(error.reason) from None
+    except UnlikelyShape as error:
+        raise InvalidBody([FieldError(pointer=error.pointer, detail=error.reason)]) from None
+    return validator.validate(parse_json(body), settings)
 
 
 def parse_json(body: bytes) -> Any:
-    """Parse JSON (RFC 8259): UTF-8, and no name twice in an object.
+    """Parse JSON (RFC 8259): UTF-8, and no name twice in an object; a byte order mark is passed over.
 
     Numbers that are too large become infinite, and ``NaN`` and ``Infinity`` are let through as such, so that
     the check of the fields can say where they are; no field takes them.
@@ -68,13 +123,19 @@ def parse_json(body: bytes) -> Any:
     ------
     MalformedJson
         If it is not JSON, or nested too deep to be read.
+    InvalidBody
+        If an object has more names than any of a request.
     """
     try:
-        return json.loads(body.decode("utf-8"), object_pairs_hook=_unique_names)
+        text = body.removeprefix(codecs.BOM_UTF8).decode("utf-8")
+        return json.loads(text, object_pairs_hook=_unique_names)
     except UnicodeDecodeError as error:
         raise MalformedJson(f"byte {error.start} is not UTF-8") from None
     except json.JSONDecodeError as error:
-        raise MalformedJson(f"{error.msg}: line {error.lineno} column {error.colno}") from None
+        before, after = error.doc[max(0, error.pos - _SHOWN) : error.pos], error.doc[error.pos :][:_SHOWN]
+        shown = f"{before!a} and then {after!a}" if after else f"{before!a} and then nothing"
+        reason = f"{error.msg}: line {error.lineno} column {error.colno}, after {shown}"
+        raise MalformedJson(reason) from None
     except RecursionError:
         raise MalformedJson("it is nested too deep") from None
     except ValueError:
@@ -82,6 +143,9 @@ def parse_json(body: bytes) -> Any:
 
 
 def _unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(pairs) > MOST_NAMES:
+        detail = f"an object has {len(pairs)} names, at most {MOST_NAMES} are taken"
+        raise InvalidBody([FieldError(pointer="", detail=detail)])
     names = dict(pairs)
     if len(names) != len(pairs):
         twice = Counter(name for name, _ in pairs).most_common(1)[0][0]

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.api.allocation_models import AnswerModel, TrainingModel
-from app.api.error_handlers import FORM_TAG
 from app.api.problem_models import ProblemModel, Whole, WireModel
 from policy_store.policy import Neighbour, Policy, PolicyPage
 
@@ -58,13 +57,13 @@ _FORMS = ("checkpoint", "train", "job_id")
 def _form_of(body: Any) -> str | None:
     given = body if isinstance(body, Mapping) else vars(body) if isinstance(body, WireModel) else {}
     present = [form for form in _FORMS if form in given]
-    return FORM_TAG + present[0] if len(present) == 1 else None
+    return present[0] if len(present) == 1 else None
 
 
 Registration = Annotated[
-    Annotated[RegisterCheckpoint, Tag(f"{FORM_TAG}checkpoint")]
-    | Annotated[RegisterTraining, Tag(f"{FORM_TAG}train")]
-    | Annotated[RegisterJob, Tag(f"{FORM_TAG}job_id")],
+    Annotated[RegisterCheckpoint, Tag("checkpoint")]
+    | Annotated[RegisterTraining, Tag("train")]
+    | Annotated[RegisterJob, Tag("job_id")],
     Discriminator(
         _form_of,
         custom_error_type="registration_form",

@@ -70,7 +70,7 @@ class FieldError(BaseModel):
         description="JSON pointer (RFC 6901) into the body; empty for the body as a whole",
         examples=["/uavs/0/speed"],
     )
-    detail: str = Field(description="What is wrong", examples=["Input should be greater than 0"])
+    detail: str = Field(description="What is wrong", examples=["is -5, must be at least 1e-09"])
     parameter: str | None = Field(
         default=None, description="The query parameter or header, where the error is not in the body"
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -116,6 +117,23 @@ class ProblemModel(WireModel):
     )
     objective: ObjectiveModel = Field(default_factory=ObjectiveModel, description="What a plan is paid for")
 
+    @classmethod
+    def require_sizes(cls, body: Mapping[str, Any], settings: Settings, at: str) -> None:
+        """Refuse a problem that is too large before its items are looked at.
+
+        Raises
+        ------
+        ProblemTooLarge
+            As :func:`to_problem` does.
+        """
+        uavs, targets = (_items(body.get(name)) for name in ("uavs", "targets"))
+        first = uavs[0] if uavs and isinstance(uavs[0], Mapping) else {}
+        _refuse_oversize(len(uavs), len(targets), len(_items(first.get("loadlist"))), settings, at)
+
+
+def _items(value: object) -> list[Any]:
+    return value if isinstance(value, list) else []
+
 
 def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
     """Convert a problem to the domain.
@@ -136,7 +154,7 @@ def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
     InvalidProblem
         If it breaks a rule between fields. Pointers of both are into the request's body.
     """
-    _refuse_oversize(body, settings, at)
+    _refuse_oversize(len(body.uavs), len(body.targets), len(body.uavs[0].loadlist), settings, at)
     try:
         return Problem(
             uavs=tuple(_uav(uav, number) for number, uav in enumerate(body.uavs, 1)),
@@ -149,11 +167,11 @@ def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
         raise InvalidProblem.of([Violation(at + v.pointer, v.detail) for v in error.violations]) from None
 
 
-def _refuse_oversize(body: ProblemModel, settings: Settings, at: str) -> None:
+def _refuse_oversize(n_uavs: int, n_targets: int, n_materials: int, settings: Settings, at: str) -> None:
     sizes = (
-        ("/uavs", "UAVs", len(body.uavs), settings.max_uavs),
-        ("/targets", "targets", len(body.targets), settings.max_targets),
-        ("/uavs/0/loadlist", "materials", len(body.uavs[0].loadlist), settings.max_materials),
+        ("/uavs", "UAVs", n_uavs, settings.max_uavs),
+        ("/targets", "targets", n_targets, settings.max_targets),
+        ("/uavs/0/loadlist", "materials", n_materials, settings.max_materials),
     )
     violations = [
         Violation(at + pointer, f"{size} {what}, at most {limit} are taken")

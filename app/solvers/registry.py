@@ -14,6 +14,7 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
+from app.field_errors import in_words
 from app.solvers.protocol import STORED, Parameters, Solver, SolverContext
 
 _FLOOR = "app.solvers.floor:Floor"
@@ -153,12 +154,13 @@ def parse_parameters(name: str, given: Mapping[str, Any], *, stored: bool = Fals
         If a parameter is unknown, out of range or of no use to the mode; violations point into
         ``/parameters``.
     """
+    model = algorithm(name).parameter_model()
     try:
-        return algorithm(name).parameter_model().model_validate(dict(given), context={STORED: stored})
+        return model.model_validate(dict(given), context={STORED: stored})
     except ValidationError as error:
         violations = [
-            Violation("/".join(("/parameters", *map(str, e["loc"]))), e["msg"])
-            for e in error.errors(include_url=False, include_context=False, include_input=False)
+            Violation("/".join(("/parameters", *map(str, e["loc"]))), in_words(e, list(model.model_fields)))
+            for e in error.errors(include_url=False)
         ]
         raise InvalidParameters(
             f"parameters of {name}: {violations[0].pointer}: {violations[0].detail}", violations

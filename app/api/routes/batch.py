@@ -15,7 +15,6 @@ from app.api.allocation_payload import allocation_payload
 from app.api.batch import Ended, Submission
 from app.api.batch_models import BatchItem, BatchLine, BatchRequest
 from app.api.error_handlers import problem_of
-from app.api.errors import BatchTooLarge
 from app.api.job_answers import answer_of, idempotency
 from app.api.job_kinds import BATCH
 from app.api.json_body import JsonRoute
@@ -67,9 +66,6 @@ async def allocate_batch(
     key, the request gets the answers of the first time, and what was not taken in yet is. Without one they
     are cancelled when the client goes, but for those that somebody else follows.
     """
-    limit = services.settings.batch_limit
-    if len(body.problems) > limit:
-        raise BatchTooLarge(limit, len(body.problems))
     prepared = [
         partial(_submission, item, services, idempotency_key, index)
         for index, item in enumerate(body.problems)
