@@ -19,6 +19,7 @@ from app.api import stored_json
 from app.api.access.guard import Guard
 from app.api.access.keys import KeyStore
 from app.api.batch import Batches
+from app.api.connections import raise_descriptor_limit
 from app.api.dashboard import install_dashboard
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
@@ -72,6 +73,7 @@ def create_application(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(application: FastAPI) -> AsyncIterator[None]:
         asyncio.get_running_loop().set_default_executor(started_threads(_REQUEST_THREADS))
+        raise_descriptor_limit()
         limits = ContainerLimits(bytes=settings.max_checkpoint_bytes)
         database = Database(settings.resolved_database_url, stored_json.write, stored_json.read)
         try:

@@ -19,13 +19,13 @@ from typing import Any
 
 import h11
 from structlog.contextvars import bound_contextvars
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from app.api.connections import BoundedProtocol
 from app.api.problem_details import problem_response
 from app.api.security_headers import SECURITY_HEADERS
 
 
-def protocol_with_deadline(seconds: float) -> type[H11Protocol]:
+def protocol_with_deadline(seconds: float) -> type[BoundedProtocol]:
     """Return a protocol class for ``uvicorn.Config(http=…)``.
 
     Parameters
@@ -42,7 +42,7 @@ def protocol_with_deadline(seconds: float) -> type[H11Protocol]:
     return DeadlineProtocol
 
 
-class _DeadlineProtocol(H11Protocol):
+class _DeadlineProtocol(BoundedProtocol):
     receive_timeout_s: float
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
