@@ -12,6 +12,7 @@ from __future__ import annotations
 import logging
 import sys
 import threading
+import unicodedata
 from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from typing import Any, TextIO
@@ -22,6 +23,9 @@ from structlog.stdlib import ExtraAdder, ProcessorFormatter
 _QUIETER = {"alembic": logging.WARNING, "uvicorn.access": logging.CRITICAL}
 """Loggers that say what nobody asks; requests are logged by :mod:`app.api.request_log`."""
 
+_OBEYED = frozenset({"Cc", "Zl", "Zp"})
+_TURNS_TEXT = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""What a terminal does instead of showing it: controls, line breaks, changes of direction."""
 
 _log = logging.getLogger(__name__)
 _of_process: dict[str, str] = {}
@@ -39,7 +43,7 @@ def configure_logs(level: str, stream: TextIO = sys.stderr) -> None:
     """
     terminal = stream.isatty()
     render: list[Any] = (
-        [structlog.dev.ConsoleRenderer()]
+        [_show_control_characters, structlog.dev.ConsoleRenderer()]
         if terminal
         else [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     )
@@ -70,6 +74,21 @@ def _finish(_logger: object, _method: str, event: MutableMapping[str, Any]) -> M
     event.pop("color_message", None)
     event.update(_of_process)
     return event
+
+
+def _show_control_characters(
+    _logger: object, _method: str, event: MutableMapping[str, Any]
+) -> MutableMapping[str, Any]:
+    """Write out what a terminal would obey, which a client may have sent; JSON does so by itself."""
+    for name, value in event.items():
+        if isinstance(value, str) and not value.isprintable():
+            event[name] = "".join(each if _is_shown(each) else ascii(each)[1:-1] for each in value)
+    return event
+
+
+def _is_shown(character: str) -> bool:
+    obeyed = unicodedata.category(character) in _OBEYED or character in _TURNS_TEXT
+    return character.isprintable() or not obeyed
 
 
 def configure_worker_logs(level: str, stream: TextIO = sys.stderr) -> None:

@@ -42,6 +42,22 @@ class Settings(BaseSettings):
         default=False,
         description="Take requests without API keys from everybody, also on addresses that others can reach",
     )
+    require_keys: bool = Field(
+        default=False,
+        description="Need API keys also on an address that only this machine reaches, and before one was "
+        "made: for a service behind a proxy on the same machine",
+    )
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(),
+        description="Names by which clients may call the service, as in the header `Host`, with commas "
+        "between them; `*`: any. Addresses, `localhost`, the name in `ALLOCATOR_HOST` and that of the "
+        "machine are always taken; others are refused where no key is needed, and once this is set",
+    )
+    trusted_proxies: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(),
+        description="Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed, with "
+        "commas between them",
+    )
     cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(), description="Origins whose pages may call the service, with commas between them"
     )
@@ -148,16 +164,24 @@ class Settings(BaseSettings):
             )
         return self
 
-    @field_validator("cors_origins", mode="before")
+    @model_validator(mode="after")
+    def _keys_are_needed_or_not(self) -> Self:
+        if self.no_keys and self.require_keys:
+            raise ValueError("ALLOCATOR_NO_KEYS and ALLOCATOR_REQUIRE_KEYS exclude each other")
+        return self
+
+    @field_validator("cors_origins", "allowed_hosts", "trusted_proxies", mode="before")
     @classmethod
     def _split(cls, given: object) -> object:
         if not isinstance(given, str):
             return given
-        return tuple(origin.strip() for origin in given.split(",") if origin.strip())
+        return tuple(each.strip() for each in given.split(",") if each.strip())
 
     @property
     def always_needs_keys(self) -> bool:
         """Whether requests need a key even while none was made: others than this machine can reach it."""
+        if self.require_keys:
+            return True
         if self.no_keys or self.host == "localhost":
             return False
         try:

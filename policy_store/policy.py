@@ -16,7 +16,8 @@ from policy_store.errors import InvalidPolicy, InvalidVector
 
 Vector = npt.NDArray[np.float32]
 
-_ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}")
+ID_PATTERN = r"[A-Za-z0-9][A-Za-z0-9._-]{0,127}"
+"""A policy's id: letters, digits, ``.``, ``_``, ``-``, at most 128."""
 _TEXT_LENGTHS = {"name": 256, "architecture": 128, "algorithm": 128}
 _MAX_SPACE_LENGTH = 256
 _MAX_COUNT = 2**31 - 1
@@ -91,7 +92,7 @@ class NewPolicy:
     id: str | None = None
 
     def __post_init__(self) -> None:
-        if self.id is not None and not _ID.fullmatch(self.id):
+        if self.id is not None and not re.fullmatch(ID_PATTERN, self.id):
             raise InvalidPolicy("id", f"{self.id!r} is not 1 to 128 letters, digits, '.', '_' or '-'")
         for name, length in _TEXT_LENGTHS.items():
             _require_text(name, getattr(self, name), length)

@@ -17,7 +17,9 @@ from live_service import SMALL
 from typer.testing import CliRunner
 
 from app.api.access.keys import KeyStore, Role, recognise
+from app.api.server import Server
 from app.cli import application
+from app.settings import Settings
 from policy_store.database import Database
 
 ROOT = Path(__file__).parents[1]
@@ -228,3 +230,13 @@ def test_a_backup_of_nothing_is_refused_and_makes_nothing(invoke, tmp_path):
     assert refused.exit_code == 1
     assert "allocator.sqlite3" in refused.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("proxies", "believed"), [("", []), ("192.0.2.1, 192.0.2.2", ["192.0.2.1", "192.0.2.2"])]
+)
+def test_only_a_proxy_that_was_named_says_who_the_client_is(tmp_path, monkeypatch, proxies, believed):
+    monkeypatch.setenv("ALLOCATOR_TRUSTED_PROXIES", proxies)
+    config = Server(Settings(data_dir=tmp_path)).config
+    assert config.proxy_headers is bool(believed)
+    assert config.forwarded_allow_ips == believed

@@ -17,6 +17,7 @@ from starlette.middleware.cors import CORSMiddleware
 import app
 from app.api import stored_json
 from app.api.access.guard import Guard
+from app.api.access.hosts import Hosts
 from app.api.access.keys import KeyStore
 from app.api.batch import Batches
 from app.api.connections import raise_descriptor_limit
@@ -193,6 +194,12 @@ def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:
                 expose_headers=_SENT_HEADERS,
             )
         )
-    if not settings.no_keys:
-        listed.append(Middleware(Guard, always=settings.always_needs_keys))
+    listed.append(
+        Middleware(
+            Guard,
+            always=settings.always_needs_keys,
+            never=settings.no_keys,
+            hosts=Hosts(settings.host, settings.allowed_hosts),
+        )
+    )
     return [*listed, Middleware(BodyLimit, limit=settings.max_body_bytes), Middleware(HeadRequests)]

@@ -12,11 +12,12 @@ from typing import Any
 from asgi_correlation_id import correlation_id
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import DataError, InterfaceError, OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import compile_path
 
+from app.api.access.guard import route_path
 from app.api.errors import InvalidBody, RequestError
 from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
 from app.api.security_headers import SECURITY_HEADERS
@@ -52,6 +53,7 @@ def install_error_handlers(application: FastAPI) -> None:
     application.add_exception_handler(AllocatorError, _allocator_error)
     for error in _CODES:
         application.add_exception_handler(error, _known_error)
+    application.add_exception_handler(DataError, _unstorable)
     for error in _STORE_IS_AWAY:
         application.add_exception_handler(error, _store_unavailable)
     application.add_exception_handler(Exception, _defect)
@@ -63,6 +65,7 @@ def problem_of(request: Request, error: Exception) -> dict[str, Any]:
         ((RequestError,), _request_error),
         ((AllocatorError,), _allocator_error),
         (tuple(_CODES), _known_error),
+        ((DataError,), _unstorable),
         (_STORE_IS_AWAY, _store_unavailable),
     )
     handle = next((handler for kinds, handler in known if isinstance(error, kinds)), None)
@@ -121,7 +124,7 @@ def _methods_at(request: Request) -> list[str]:
     """List the methods of a place; the router names those of one route only, where several share it."""
     paths = request.app.openapi()["paths"]
     # A path that is spelled out is another place than those whose template it fits too.
-    path = request.url.path
+    path = route_path(request.scope)
     templates = [path] if path in paths else [each for each in paths if compile_path(each)[0].match(path)]
     methods = {method.upper() for template in templates for method in paths[template]}
     if "GET" in methods and not path.endswith("/events"):
@@ -161,6 +164,15 @@ def _known_error(request: Request, error: Exception) -> Response:
         wait_s = getattr(error, "retry_after_s", _DRAINING_RETRY_S)
         headers["Retry-After"] = str(max(1, math.ceil(wait_s)))
     return problem_response(code, str(error), _instance(request), headers=headers)
+
+
+def _unstorable(request: Request, error: Exception) -> Response:
+    _log.error("a request has what the database does not hold: %s", error)
+    return problem_response(
+        "invalid-request",
+        "the request has text or a number that the database cannot hold",
+        _instance(request),
+    )
 
 
 def _store_unavailable(request: Request, error: Exception) -> Response:

@@ -21,6 +21,7 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "bad-request": HTTPStatus.BAD_REQUEST,
     "unauthenticated": HTTPStatus.UNAUTHORIZED,
     "forbidden": HTTPStatus.FORBIDDEN,
+    "host-not-allowed": HTTPStatus.MISDIRECTED_REQUEST,
     "not-found": HTTPStatus.NOT_FOUND,
     "method-not-allowed": HTTPStatus.METHOD_NOT_ALLOWED,
     "request-timeout": HTTPStatus.REQUEST_TIMEOUT,
@@ -152,7 +153,11 @@ def responses(*codes: str) -> dict[int | str, dict[str, Any]]:
     codes
         Problem types that the route can answer with.
     """
-    types: dict[int, list[str]] = {500: ["internal-error"], 503: ["store-unavailable"]}
+    types: dict[int, list[str]] = {
+        421: ["host-not-allowed"],
+        500: ["internal-error"],
+        503: ["store-unavailable"],
+    }
     for code in codes:
         types.setdefault(status_of(code).value, []).append(code)
     return {

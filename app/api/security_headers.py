@@ -1,8 +1,9 @@
-"""What every response tells a browser not to do."""
+"""What every response tells a browser not to do, and where it does not send it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from urllib.parse import urlsplit, urlunsplit
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -60,6 +61,15 @@ class SecurityHeaders:
                 headers = MutableHeaders(scope=message)
                 for name, value in SECURITY_HEADERS.items():
                     headers.setdefault(name, value)
+                if "location" in headers:
+                    # The framework builds it of the header Host, which is the client's to choose.
+                    headers["location"] = _path_of(headers["location"])
             await send(message)
 
         await self._app(scope, receive, add)
+
+
+def _path_of(location: str) -> str:
+    """Return a place as a path, which is one of this service wherever it is called."""
+    parts = urlsplit(location)
+    return urlunsplit(("", "", parts.path, parts.query, parts.fragment))

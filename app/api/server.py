@@ -36,6 +36,8 @@ class Server(uvicorn.Server):
                 access_log=False,
                 http=protocol_with_deadline(settings.receive_timeout_s),
                 timeout_graceful_shutdown=math.ceil(settings.shutdown_grace_s),
+                proxy_headers=bool(settings.trusted_proxies),
+                forwarded_allow_ips=list(settings.trusted_proxies),
             )
         )
 

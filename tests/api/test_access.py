@@ -56,7 +56,7 @@ class Caller:
     def request(self, method, path, **options):
         async def call():
             transport = httpx.ASGITransport(self.app, raise_app_exceptions=False)
-            async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
+            async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
                 return await client.request(method, path, **options)
 
         return asyncio.run(call())
@@ -307,3 +307,76 @@ def test_origins_come_from_the_environment_with_commas(monkeypatch):
     monkeypatch.setenv("ALLOCATOR_CORS_ORIGINS", "https://a.example,https://b.example")
 
     assert Settings().cors_origins == ("https://a.example", "https://b.example")
+
+
+REBOUND = {"Host": "attacker.example"}
+
+
+def test_while_no_key_is_needed_the_host_has_to_be_one_of_this_machine(start, keys):
+    service = start()
+    for method, path in (
+        ("GET", "/jobs"),
+        ("DELETE", "/library/x"),
+        ("POST", "/allocate"),
+        ("GET", "/metrics"),
+    ):
+        refused = service.request(method, path, headers=REBOUND)
+        assert (refused.status_code, refused.json()["type"]) == (421, "host-not-allowed")
+    for host in ("localhost", "LOCALHOST:8000", "127.0.0.1:80", "[::1]:8000", "192.0.2.7"):
+        assert service.get("/jobs", headers={"Host": host}).status_code == 200
+    for host in (
+        "",
+        "127.0.0.1.attacker.example",
+        "localhost.attacker.example",
+        "127.0.0.1@attacker.example",
+    ):
+        assert service.get("/jobs", headers={"Host": host}).status_code == 421
+
+    _, token = keys.create("x", Role.ALLOCATE)
+    service = start()
+    sent = REBOUND | {"Authorization": f"Bearer {token}"}
+    assert service.get("/jobs", headers=REBOUND).status_code == 401
+    assert service.get("/jobs", headers=sent).status_code == 200
+    assert start(allowed_hosts=("plans.example",)).get("/jobs", headers=sent).status_code == 421
+
+
+def test_names_that_an_operator_allows_are_taken(start):
+    service = start(allowed_hosts=("plans.example",))
+    assert service.get("/jobs", headers={"Host": "plans.example:443"}).status_code == 200
+    assert service.get("/healthz", headers=REBOUND).status_code == 421
+    assert start(allowed_hosts=("*",)).get("/jobs", headers=REBOUND).status_code == 200
+    assert start(host="0.0.0.0", no_keys=True).get("/jobs", headers=REBOUND).status_code == 421
+
+
+def test_a_service_behind_a_proxy_can_need_keys_from_the_first_request(start):
+    assert start(require_keys=True).get("/jobs").status_code == 401
+    with pytest.raises(ValueError, match="exclude each other"):
+        Settings(require_keys=True, no_keys=True)
+
+
+def test_the_guard_judges_by_the_path_below_the_root_path(start, keys):
+    _, token = keys.create("x", Role.ALLOCATE)
+    service = start()
+
+    async def call(method, path):
+        transport = httpx.ASGITransport(service.app, root_path="/uav")
+        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+            return await client.request(method, path, headers={"Authorization": f"Bearer {token}"})
+
+    assert asyncio.run(call("DELETE", "/uav/library/x")).status_code == 403
+    assert asyncio.run(call("GET", "/uav/jobs")).status_code == 200
+    assert asyncio.run(call("GET", "/uav/healthz")).status_code == 200
+
+
+def test_only_asking_for_similar_tasks_is_reading():
+    assert needed_role("POST", "/library/similar") is Role.ALLOCATE
+    for method in ("DELETE", "PUT", "PATCH"):
+        assert needed_role(method, "/library/similar") is Role.LIBRARY
+
+
+@pytest.mark.parametrize("path", ["/dashboard", "/docs/assets", "/jobs/"])
+def test_a_place_is_named_by_its_path_and_not_by_the_header_host(start, path):
+    answer = start(allowed_hosts=("*",)).get(path, headers=REBOUND)
+    assert answer.status_code == 307
+    assert answer.headers["location"].startswith("/")
+    assert "attacker" not in answer.headers["location"]

@@ -207,7 +207,7 @@ class _Client:
     def _drop(self) -> None:
         """Hang up in the midst of a request, or while its answer is worked on."""
         body = json.dumps(self._body()).encode()
-        lines = "POST /allocate HTTP/1.1", "Host: x", "Content-Type: application/json"
+        lines = "POST /allocate HTTP/1.1", "Host: localhost", "Content-Type: application/json"
         whole = "\r\n".join((*lines, f"Content-Length: {len(body)}", "", "")).encode() + body
         share = self._rng.choice((0.0, 0.01, 0.5, 1.0))
         url = self._http.base_url

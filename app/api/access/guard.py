@@ -18,6 +18,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 from structlog.contextvars import bind_contextvars
 
+from app.api.access.hosts import Hosts
 from app.api.access.keys import ApiKey, KeyStore, Role, recognise
 from app.api.problem_details import problem_response, responses
 
@@ -52,12 +53,18 @@ def needed_role(method: str, path: str) -> Role | None:
     method
         Upper case.
     path
-        Of the request, or the template of its route.
+        Of the request below the root path, or the template of its route.
     """
     if path in OPEN_PATHS or path.startswith(OPEN_FOLDERS):
         return None
-    reads = method in ("GET", "HEAD") or path == "/library/similar"
+    reads = method in ("GET", "HEAD") or (method, path) == ("POST", "/library/similar")
     return Role.LIBRARY if path.startswith("/library") and not reads else Role.ALLOCATE
+
+
+def route_path(scope: Scope) -> str:
+    """Return the path of a request below the root path that a proxy or a mount puts before it."""
+    path, root = str(scope["path"]), str(scope.get("root_path", "")).rstrip("/")
+    return path.removeprefix(root) if root and path.startswith(f"{root}/") else path
 
 
 def document(operation: dict[str, Any], role: Role | None, *, required: bool) -> None:
@@ -89,22 +96,39 @@ class Guard:
         The application behind it; its state has the services.
     always
         True: also while no key was ever made. False: from the first key on.
+    never
+        True: nobody needs a key.
+    hosts
+        Names by which the service may be called.
     """
 
-    def __init__(self, app: ASGIApp, *, always: bool) -> None:
+    def __init__(self, app: ASGIApp, *, always: bool, never: bool, hosts: Hosts) -> None:
         self._app = app
+        self._never, self._hosts = never, hosts
         self._always = always
         self._keys: Mapping[str, ApiKey] = {}
         self._read_at = float("-inf")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer 401 or 403."""
-        role = needed_role(scope["method"], scope["path"]) if scope["type"] == "http" else None
-        if role is None:
+        if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        keys = await self._newest(scope["app"].state.services.keys)
-        if not keys and not self._always:
+        role = needed_role(scope["method"], route_path(scope))
+        # Whether the service lives is told without its database.
+        known = self._never or role is None
+        keys = {} if known else await self._newest(scope["app"].state.services.keys)
+        is_open = self._never or not (known or keys or self._always)
+        # A page elsewhere can have its own name lead to this machine, and would then read what needs no key.
+        if (is_open or self._hosts.were_named) and not self._hosts.may_be(Headers(scope=scope).get("host")):
+            refusal = problem_response(
+                "host-not-allowed",
+                "the header Host has no name of this service; ALLOCATOR_ALLOWED_HOSTS adds names",
+                scope["path"],
+            )
+            await refusal(scope, receive, send)
+            return
+        if role is None or is_open:
             await self._app(scope, receive, send)
             return
         scheme, _, token = Headers(scope=scope).get("authorization", "").partition(" ")

@@ -6,17 +6,16 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Path, Query
+from fastapi import APIRouter, Header, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.access.guard import key_is_valid
 from app.api.job_models import JobList, JobModel, job_list, job_response, problem_of
-from app.api.library_models import JOB_ID_PATTERN
 from app.api.problem_details import responses
 from app.api.problem_models import ProblemModel
-from app.api.routes.parameters import Cursor
+from app.api.routes.parameters import Cursor, JobId
 from app.api.services import Served
 from app.api.stored_json import write
 from app.jobs.model import JobStatus
@@ -24,9 +23,6 @@ from app.jobs.service import JobService
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
-JobId = Annotated[
-    str, Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32])
-]
 _EVENT = {
     "description": "One event",
     "type": "object",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Header, Path, Query
+from fastapi import APIRouter, Body, Header, Query
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response
 
@@ -28,14 +28,12 @@ from app.api.openapi_examples import REGISTRATION_EXAMPLES, SIMILAR_EXAMPLES
 from app.api.problem_details import responses
 from app.api.problem_models import to_problem
 from app.api.registration import checkpoint_payload, job_payload, training_payload
-from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey
+from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey, PolicyId
 from app.api.services import Served
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 
 router = APIRouter(prefix="/library", route_class=JsonRoute, tags=["library"])
-
-PolicyId = Annotated[str, Path(description="The policy", examples=["uniform-5x10x3"])]
 
 
 @router.post(

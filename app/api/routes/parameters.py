@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
-from fastapi import Header, Query
+from fastapi import Header, Path, Query
+from pydantic import AfterValidator
+
+from app.api.library_models import JOB_ID_PATTERN
+from app.jobs.errors import JobNotFound
+from policy_store.errors import PolicyNotFound
+from policy_store.policy import ID_PATTERN as POLICY_ID_PATTERN
 
 IdempotencyKey = Annotated[
     str | None,
@@ -29,6 +36,35 @@ Cursor = Annotated[
         description="`next_cursor` of the page before",
         json_schema_extra={"pattern": "^[0-9]{1,18}$"},
     ),
+]
+
+
+def _job_id(given: str) -> str:
+    if not re.fullmatch(JOB_ID_PATTERN, given):
+        raise JobNotFound(given)
+    return given
+
+
+def _policy_id(given: str) -> str:
+    if not re.fullmatch(POLICY_ID_PATTERN, given):
+        raise PolicyNotFound(given)
+    return given
+
+
+# What has not the form of an id is the id of nothing, which is said without asking the database.
+JobId = Annotated[
+    str,
+    Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32]),
+    AfterValidator(_job_id),
+]
+PolicyId = Annotated[
+    str,
+    Path(
+        description="The policy",
+        json_schema_extra={"pattern": f"^{POLICY_ID_PATTERN}$"},
+        examples=["uniform-5x10x3"],
+    ),
+    AfterValidator(_policy_id),
 ]
 
 LOCATION: dict[str, Any] = {"Location": {"description": "Where it is", "schema": {"type": "string"}}}

@@ -23,7 +23,7 @@ from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, Fl
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
 from app.api.problem_details import responses
-from app.api.routes.jobs import JobId
+from app.api.routes.parameters import JobId
 from app.api.services import Served
 from app.domain.records import problem_from_record
 from app.jobs.model import Job
