@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from policy_store.errors import InvalidPolicy, InvalidVector
+from policy_store.soundness import fault_of, is_storable
 
 Vector = npt.NDArray[np.float32]
 
@@ -162,7 +163,7 @@ def _require_text(name: str, value: object, max_length: int) -> None:
 
 def _require_storable(name: str, text: str) -> None:
     """Refuse what no database stores: half of a surrogate pair, and the null character."""
-    if "\0" in text or any("\ud800" <= character <= "\udfff" for character in text):
+    if not is_storable(text):
         raise InvalidPolicy(name, "it has text that is not Unicode or a null character")
 
 
@@ -175,10 +176,8 @@ def _as_json(name: str, value: object) -> dict[str, Any]:
     """Copy a JSON object, as it will be when it is read back."""
     if not isinstance(value, Mapping):
         raise InvalidPolicy(name, "not an object")
-    try:
-        text = json.dumps(dict(value), allow_nan=False, ensure_ascii=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InvalidPolicy(name, f"not JSON: {error}") from error
-    _require_storable(name, text)
-    copy: dict[str, Any] = json.loads(text)
+    fault = fault_of(dict(value))
+    if fault is not None:
+        raise InvalidPolicy(name, fault)
+    copy: dict[str, Any] = json.loads(json.dumps(dict(value)))
     return copy

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy import (
     JSON,
@@ -20,6 +22,8 @@ from sqlalchemy import (
     Table,
 )
 from sqlalchemy.types import TypeDecorator
+
+from policy_store.soundness import fault_of
 
 metadata = MetaData()
 
@@ -39,6 +43,28 @@ class UtcDateTime(TypeDecorator[datetime]):
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+class SoundJSON(JSON):
+    """A JSON object. One that is damaged, or that an earlier version let in, is read as an empty one.
+
+    A row that cannot be read would otherwise break every list that it is in.
+    """
+
+    cache_ok = True
+
+    def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any]:
+        """Return what reads a value."""
+        read = super().result_processor(dialect, coltype)
+
+        def read_or_leave(value: Any) -> Any:
+            try:
+                found = value if read is None else read(value)
+            except (ValueError, RecursionError):
+                return {}
+            return found if isinstance(found, dict) and fault_of(found) is None else {}
+
+        return read_or_leave
 
 
 # One row. Every write adds one to it first: caches in other processes see that something changed, policies
@@ -69,12 +95,12 @@ policies = Table(
     Column("n_uavs", Integer, nullable=False),
     Column("n_targets", Integer, nullable=False),
     Column("n_materials", Integer, nullable=False),
-    Column("task", JSON, nullable=False),
+    Column("task", SoundJSON, nullable=False),
     Column("architecture", String(128), nullable=False),
     Column("algorithm", String(128), nullable=False),
     Column("seed", BigInteger),
-    Column("metrics", JSON, nullable=False),
-    Column("metadata", JSON, nullable=False),
+    Column("metrics", SoundJSON, nullable=False),
+    Column("metadata", SoundJSON, nullable=False),
     Column("created_at", UtcDateTime, nullable=False),
     Column("checkpoint_sha256", String(64), ForeignKey("checkpoints.sha256"), nullable=False),
     CheckConstraint("n_uavs >= 1 AND n_targets >= 1 AND n_materials >= 1", name="policies_sizes"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +18,8 @@ from policy_store.tables import feature_vectors, library_revision, policies
 _VectorRow = Row[*tuple[Any, ...]]  # id, architecture, vector
 
 _MAX_SPACES = 128
+_BYTES = 4
+"""Of a number of a vector."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +121,12 @@ def _rows_after(connection: Connection, space: str, sequence: int) -> Sequence[_
 
 
 def _space(rows: Sequence[_VectorRow], revision: int) -> VectorSpace:
-    matrix = vector_from_bytes(b"".join(row.vector for row in rows)).reshape(len(rows), -1)
+    """Put vectors together; those of another length than most, or with numbers not finite, are left out."""
+    length, _ = Counter(len(row.vector) for row in rows).most_common(1)[0]
+    rows = [
+        row for row in rows if len(row.vector) == length and np.isfinite(vector_from_bytes(row.vector)).all()
+    ]
+    matrix = vector_from_bytes(b"".join(row.vector for row in rows)).reshape(len(rows), length // _BYTES)
     return VectorSpace(
         revision, tuple(row.id for row in rows), np.array([row.architecture for row in rows]), matrix
     )

@@ -38,6 +38,9 @@ _CODES: Mapping[type[Exception], str] = {
     store_errors.InvalidCursor: "invalid-cursor",
     store_errors.DuplicatePolicy: "duplicate-policy",
     store_errors.InvalidPolicy: "invalid-policy",
+    store_errors.InvalidVector: "invalid-policy",
+    store_errors.InvalidContainer: "invalid-checkpoint",
+    store_errors.CorruptCheckpoint: "damaged-checkpoint",
 }
 Handler = Callable[[Request, Exception], Response]
 

@@ -45,7 +45,10 @@ def job_kinds(
 
     def add_to_library(connection: Connection, job: Job, work: WorkResult) -> dict[str, Any]:
         if work.artifact is None:
-            raise InvalidCheckpoint(f"{job.kind} job {job.id} has left no checkpoint")
+            raise InvalidCheckpoint(
+                f"{job.kind} job {job.id} has left no checkpoint: it was stopped before its first epoch, or "
+                "its training has diverged"
+            )
         task = problem_from_record(job.payload["problem"])
         policy = library.add(new_policy(job.payload["name"], task, work.artifact, limits=limits), connection)
         return {**work.result, "policy_id": policy.id}

@@ -58,6 +58,7 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "policy-not-found": HTTPStatus.NOT_FOUND,
     "duplicate-policy": HTTPStatus.CONFLICT,
     "invalid-policy": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "damaged-checkpoint": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
 MAX_LISTED_ERRORS = 100

@@ -56,8 +56,11 @@ def checkpoint_payload(body: RegisterCheckpoint, services: Services) -> dict[str
     Raises
     ------
     InvalidCheckpoint
-        If they are more than is taken; all else is found by the job.
+        If they are more than is taken, or no ASCII text; all else is found by the job.
     """
+    if not body.checkpoint.isascii():
+        detail = "the checkpoint is not base64: it has characters beyond ASCII"
+        raise InvalidCheckpoint(detail, [Violation("/checkpoint", detail)])
     limit = services.settings.max_checkpoint_bytes
     padding = body.checkpoint[-2:].count("=")
     size = len(body.checkpoint) * _BASE64_BYTES // _BASE64_CHARACTERS - padding

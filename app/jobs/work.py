@@ -183,9 +183,12 @@ def train(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     Raises
     ------
     AllocatorError
-        As in :func:`allocate`.
+        As in :func:`allocate`; or if what was learned cannot be used, because the training has diverged.
     """
-    return allocate({**payload, "keep_checkpoint": True}, context)
+    done = allocate({**payload, "keep_checkpoint": True}, context)
+    if done.artifact is not None:
+        verify(done.artifact, problem_from_record(payload["problem"]))
+    return done
 
 
 def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # noqa: ARG001 - nothing to report

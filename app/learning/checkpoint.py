@@ -9,6 +9,7 @@ finiteness, and only then a network is built.
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,6 +33,7 @@ from app.learning.universal.policy import UniversalPolicy, values_of_greedy_plan
 from app.solvers.protocol import Parameters
 from policy_store.checkpoint import read_container, require_finite, require_tensors
 from policy_store.errors import InvalidContainer
+from policy_store.soundness import read_object
 
 FORMAT = 1
 """Version of the metadata's fields."""
@@ -40,6 +42,8 @@ _METADATA_KEY = "checkpoint"
 
 _CHECKED_UAVS, _CHECKED_TARGETS = 16, 32
 """How much of a task a policy for every size is tried on."""
+
+_log = logging.getLogger(__name__)
 
 Config = QmixConfig | UniversalConfig
 Network = QmixNetwork | UniversalPolicy
@@ -100,20 +104,28 @@ def encode(
     parameters: Parameters,
     metrics: Mapping[str, float | int],
     **more: object,
-) -> bytes:
+) -> bytes | None:
     """Write networks and what made them.
 
     Parameters
     ----------
     network
-        Of the sizes of `config`, its weights finite.
+        Of the sizes of `config`.
     config, task, algorithm, seed, parameters
         What was trained on what, and how.
     metrics
         What came of it: ``reward`` of the best plan, ``epochs``, and more.
     more
         What else the metadata says, JSON-ready: ``name``, ``families`` it was trained on.
+
+    Returns
+    -------
+    bytes
+        The file; None where the training has diverged, and weights are not finite any more.
     """
+    if not has_finite_weights(network):
+        _log.warning("a training has diverged", extra={"algorithm": algorithm, "metrics": dict(metrics)})
+        return None
     name = next(name for name, known in ARCHITECTURES.items() if isinstance(config, known.config))
     metadata = {
         **more,
@@ -129,6 +141,11 @@ def encode(
         "version": app.__version__,
     }
     return _pack({name: tensor.cpu() for name, tensor in network.state_dict().items()}, metadata)
+
+
+def has_finite_weights(network: torch.nn.Module) -> bool:
+    """Say whether every weight of a network is a finite number."""
+    return all(bool(weights.isfinite().all()) for weights in network.state_dict().values())
 
 
 def with_name(data: bytes, name: str) -> bytes:
@@ -155,11 +172,9 @@ def read_metadata(data: bytes) -> dict[str, Any]:
     except InvalidContainer as error:
         raise InvalidCheckpoint(str(error)) from error
     try:
-        metadata = None if text is None else json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidCheckpoint(f"its metadata {_METADATA_KEY!r} is not JSON") from error
-    if not isinstance(metadata, dict):
-        raise InvalidCheckpoint(f"its metadata has no JSON object under {_METADATA_KEY!r}")
+        metadata = read_object(text or "")
+    except ValueError as error:
+        raise InvalidCheckpoint(f"its metadata {_METADATA_KEY!r} cannot be used: {error}") from None
     _require(metadata, "format", [FORMAT])
     _require(metadata, "architecture", list(ARCHITECTURES))
     _require(metadata, "features", [ARCHITECTURES[metadata["architecture"]].features])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
+from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
@@ -20,6 +21,14 @@ def train_source(
     stop: StopCriterion,
     report: Callable[[Progress], None],
 ) -> bytes:
-    """Train on a task, given as a record, and return the checkpoint."""
+    """Train on a task, given as a record, and return the checkpoint.
+
+    Raises
+    ------
+    InvalidCheckpoint
+        If the training has diverged.
+    """
     solution = Qmix(parameters, SolverContext()).solve(problem_from_record(record), SEED, stop, report)
-    return cast(bytes, solution.checkpoint)
+    if solution.checkpoint is None:
+        raise InvalidCheckpoint("the training has diverged")
+    return solution.checkpoint

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from typing import Any
 
 from app.domain.errors import InvalidCheckpoint
@@ -11,10 +11,15 @@ from app.domain.records import problem_to_record
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from policy_store.checkpoint import ContainerLimits, read_container
-from policy_store.errors import InvalidContainer
+from policy_store.errors import InvalidContainer, InvalidPolicy, InvalidVector
 from policy_store.policy import NewPolicy
+from policy_store.soundness import read_object
 
 _DEFAULT_LIMITS = ContainerLimits()
+METADATA_KEY = "checkpoint"
+"""Under which a checkpoint's metadata is in its file."""
+
+_MOST_METRICS, _LONGEST_METRIC = 100, 256
 _OWN_COLUMNS = frozenset({"architecture", "algorithm", "seed", "task", "metrics"})
 
 
@@ -38,11 +43,9 @@ def checkpoint_metadata(checkpoint: bytes, limits: ContainerLimits = _DEFAULT_LI
     except InvalidContainer as error:
         raise InvalidCheckpoint(str(error)) from error
     try:
-        metadata = json.loads(container.metadata.get("checkpoint", ""))
-    except (ValueError, RecursionError):
-        metadata = None
-    if not isinstance(metadata, dict):
-        raise InvalidCheckpoint("the file's metadata has no JSON object under the key 'checkpoint'")
+        metadata = read_object(container.metadata.get(METADATA_KEY, ""))
+    except ValueError as error:
+        raise InvalidCheckpoint(f"the file's metadata {METADATA_KEY!r} cannot be used: {error}") from None
     for key in ("architecture", "algorithm"):
         if not isinstance(metadata.get(key), str):
             raise InvalidCheckpoint(f"the checkpoint's metadata does not name its {key}")
@@ -75,12 +78,22 @@ def new_policy(
     Raises
     ------
     InvalidCheckpoint
-        If the file's header or metadata cannot be used.
+        If the file's header or metadata cannot be used or stored.
     policy_store.errors.InvalidPolicy
-        If the name or the metadata cannot be stored.
+        If the name or the id cannot be stored.
     """
     metadata = checkpoint_metadata(checkpoint, limits)
-    seed, metrics = metadata.get("seed"), metadata.get("metrics")
+    try:
+        return _entry(name, task, checkpoint, metadata, policy_id)
+    except (InvalidPolicy, InvalidVector) as error:
+        if isinstance(error, InvalidPolicy) and error.field in ("id", "name"):
+            raise
+        raise InvalidCheckpoint(f"the checkpoint cannot be stored: {error}") from error
+
+
+def _entry(
+    name: str, task: Problem, checkpoint: bytes, metadata: Mapping[str, Any], policy_id: str | None
+) -> NewPolicy:
     return NewPolicy(
         name=name,
         n_uavs=task.n_uavs,
@@ -94,8 +107,27 @@ def new_policy(
             description_space(task): task_description(task).astype("float32"),
             SUMMARY_SPACE: task_summary(task).astype("float32"),
         },
-        seed=seed if isinstance(seed, int) else None,
-        metrics=metrics if isinstance(metrics, dict) else {},
+        seed=metadata.get("seed"),
+        metrics=_metrics(metadata.get("metrics")),
         metadata={key: value for key, value in metadata.items() if key not in _OWN_COLUMNS},
         id=policy_id,
     )
+
+
+def _metrics(given: object) -> dict[str, Any]:
+    """Check what a checkpoint says was measured: names, each with a number or a short text.
+
+    Raises
+    ------
+    InvalidCheckpoint
+        If it is anything else.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, dict) or len(given) > _MOST_METRICS:
+        raise InvalidCheckpoint(f"its metrics are no object of at most {_MOST_METRICS} names")
+    for name, value in given.items():
+        if isinstance(value, dict | list) or len(str(value)) > _LONGEST_METRIC or len(name) > _LONGEST_METRIC:
+            shown = name[:_LONGEST_METRIC]
+            raise InvalidCheckpoint(f"its metric {shown!r} is neither a number nor a short text")
+    return given

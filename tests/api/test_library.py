@@ -226,6 +226,7 @@ def test_registration_can_be_retried(client):
         ({"name": "x", "task": TASK, "checkpoint": "not base64!"}, "/checkpoint"),
         ({"name": "x", "task": TASK, "checkpoint": "AgAAAAAAAAB7fQ=="}, "/checkpoint"),
         ({"name": "x", "task": TASK, "checkpoint": "A" * 200_004}, "/checkpoint"),
+        ({"name": "x", "task": TASK, "checkpoint": "AgAAAAAAAAB7fQé="}, "/checkpoint"),
     ],
 )
 def test_registration_that_is_refused(client, body, pointer):

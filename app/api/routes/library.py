@@ -161,7 +161,7 @@ def get_policy(policy_id: PolicyId, services: Served) -> PolicyModel:
             "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
         },
         304: {"description": "It is the one that `If-None-Match` names"},
-        **responses("policy-not-found", "invalid-request"),
+        **responses("policy-not-found", "invalid-request", "damaged-checkpoint"),
     },
 )
 def get_checkpoint(

@@ -23,6 +23,7 @@ import numpy as np
 import torch
 from pydantic import Field
 
+from app.domain.errors import InvalidCheckpoint
 from app.learning.checkpoint import encode
 from app.learning.cluster_training import connected, on_cluster
 from app.learning.universal.architecture import UniversalConfig
@@ -197,6 +198,8 @@ class Production:
             name=name,
             families=list(families),
         )
+        if data is None:
+            raise InvalidCheckpoint(f"the training of {name} has diverged")
         part = file.with_suffix(".part")
         part.write_bytes(data)
         os.replace(part, file)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.domain.problem import Problem
-from app.learning.checkpoint import encode
+from app.learning.checkpoint import encode, has_finite_weights
 from app.learning.parameters import LEARNING_RATE, QmixParameters
 from app.learning.universal.architecture import HEADS, WIDEST, UniversalConfig
 from app.learning.universal.best_plan import BestPlan
@@ -78,6 +78,9 @@ class UniversalScratch:
         while done < epochs and not self._stop():
             count = min(self._tuning.learned, epochs - done)
             plans = self._tuning.epoch(self._best.actions, self._stop, count, temperature.value)
+            if not has_finite_weights(self._tuning.policy):
+                # It would play at random and could not be kept; the plans so far are as good as ever.
+                break
             temperature.follow(plans, self._best.reward)
             recombination.consider(plans, self._stop)
             done += count

@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 
 from app.domain.problem import Problem
-from app.learning.checkpoint import encode
+from app.learning.checkpoint import encode, has_finite_weights
 from app.learning.parameters import FINE_TUNING_LR, REPLANS_A_SAMPLE, TransferQmixParameters
 from app.learning.source_policies import Source
 from app.learning.universal.best_plan import BestPlan
@@ -212,6 +212,9 @@ class UniversalTransfer:
         done, temperature = 0, Temperature(self._arrays)
         while done < used.n_epochs and not self._stop():
             plans = tuning.epoch(best.actions, self._stop, temperature=temperature.value)
+            if not has_finite_weights(tuning.policy):
+                # It would play at random and could not be kept; the plans so far are as good as ever.
+                break
             temperature.follow(plans, best.reward)
             self._recombination.consider(plans, self._stop)
             done += 1

@@ -30,7 +30,6 @@ from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import SolverContext
 from app.solvers.stop import never
 from policy_store.database import Database
-from policy_store.errors import CorruptCheckpoint
 from policy_store.library import PolicyLibrary
 
 BARE = {"n_epochs": 0, "samples": 0, "polish": False}
@@ -267,7 +266,7 @@ def test_a_preloaded_library_is_asked_for_no_weights_and_a_damaged_policy_costs_
     with database.write() as connection:
         connection.execute(text("UPDATE checkpoints SET data = :data"), {"data": b"gone"})
     assert solve(database.url, problem, source="uniform", **BARE).source_policy.id == "uniform"
-    with pytest.raises(CorruptCheckpoint):
+    with pytest.raises(InvalidParameters, match="'scarce' cannot be used"):
         solve(database.url, problem, source="scarce", **BARE)
     database.dispose()
 
