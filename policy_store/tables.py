@@ -45,12 +45,13 @@ class UtcDateTime(TypeDecorator[datetime]):
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
-class SoundJSON(JSON):
+class SoundJSON(TypeDecorator[dict[str, Any]]):
     """A JSON object. One that is damaged, or that an earlier version let in, is read as an empty one.
 
     A row that cannot be read would otherwise break every list that it is in.
     """
 
+    impl = JSON
     cache_ok = True
 
     def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any]:
