@@ -110,6 +110,10 @@ policies = Table(
     Index("ix_policies_sizes", "n_uavs", "n_targets", "n_materials"),
 )
 
+# Ids of all policies that were ever seeded, those that were deleted since included; ``*`` stands for what
+# versions without this table had seeded.
+seeded_policies = Table("seeded_policies", metadata, Column("id", String(128), primary_key=True))
+
 # ``vector`` holds ``dimension`` little-endian float32 numbers.
 feature_vectors = Table(
     "feature_vectors",

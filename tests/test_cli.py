@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 from live_service import SMALL
+from sqlalchemy import text
 from typer.testing import CliRunner
 
 from app.api.access.keys import KeyStore, Role, recognise
@@ -240,3 +241,66 @@ def test_only_a_proxy_that_was_named_says_who_the_client_is(tmp_path, monkeypatc
     config = Server(Settings(data_dir=tmp_path)).config
     assert config.proxy_headers is bool(believed)
     assert config.forwarded_allow_ips == believed
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("[]", "the request: is a list, needs an object"),
+        ("null", "the request: is null, needs an object"),
+        ("7", "the request: is 7, needs an object"),
+        ('"x"', "the request: is a text, needs an object"),
+        ("", "Expecting value: line 1 column 1"),
+        ("{uavs: 1}", "line 1 column 2"),
+        ("[" * 100_000, "nested"),
+        ('{"seed": 1, "seed": 2}', "'seed' is twice in one object"),
+        ("{}", "/uavs: is missing"),
+        ('{"uavs": [{"priority": 1}], "targets": [{}]}', "/uavs/0/priority: unknown field `priority`"),
+        ("\u00ff".encode("latin-1"), "byte 0 is not UTF-8"),
+        ("{" + ",".join(f'"f{number}": 1' for number in range(200)) + "}", "200 names"),
+    ],
+    ids=lambda each: str(each)[:20],
+)
+def test_a_request_that_is_none_is_refused_in_a_sentence(tmp_path, body, says):
+    file = tmp_path / "request.json"
+    file.write_bytes(body if isinstance(body, bytes) else body.encode())
+    refused = CliRunner().invoke(application, ["allocate", str(file), "--data-dir", str(tmp_path)])
+    assert refused.exit_code == 1
+    assert says in refused.stderr
+    assert isinstance(refused.exception, SystemExit)
+
+
+@pytest.mark.parametrize("given", ["[1]", "7", "{", "null"])
+def test_parameters_that_are_none_are_refused_in_a_sentence(tmp_path, given):
+    problem = str(ROOT / "app/examples/paper-5x10.json")
+    words = ["allocate", problem, "--data-dir", str(tmp_path), "--parameters", given]
+    refused = CliRunner().invoke(application, words)
+    assert refused.exit_code == 1
+    assert isinstance(refused.exception, SystemExit)
+    assert refused.stderr.strip()
+
+
+@pytest.mark.parametrize("name", ["a\tb", "a\nb", "\x1b[31m", "\u2028", "", "x" * 257])
+def test_names_of_keys_keep_to_their_line(invoke, name):
+    refused = invoke("keys", "create", "--role", "allocate", "--name", name)
+    assert refused.exit_code == 1
+    assert "name" in refused.stderr
+    assert invoke("keys", "list").stdout == ""
+
+
+def test_a_name_that_an_earlier_version_let_in_breaks_no_list(invoke, tmp_path):
+    assert invoke("keys", "create", "--role", "allocate", "--name", "x").exit_code == 0
+    database = Database(f"sqlite:///{tmp_path / 'allocator.sqlite3'}")
+    with database.write() as connection:
+        connection.execute(text("UPDATE api_keys SET name = 'a' || char(9) || 'b' || char(10)"))
+    database.dispose()
+    listed = invoke("keys", "list").stdout
+    assert listed.count("\n") == 1
+    assert listed.count("\t") == 4
+
+
+def test_a_variable_that_is_no_setting_is_told_of(invoke, monkeypatch):
+    monkeypatch.setenv("ALLOCATOR_WORKRES", "3")
+    told = invoke("keys", "list")
+    assert told.exit_code == 0
+    assert "ALLOCATOR_WORKRES is no setting, and is ignored; did you mean ALLOCATOR_WORKERS?" in told.stderr

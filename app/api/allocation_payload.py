@@ -8,11 +8,26 @@ from app.api.allocation_models import AllocationRequest
 from app.api.problem_models import to_problem
 from app.api.services import Services
 from app.domain.records import problem_to_record
+from app.settings import Settings
 from app.solvers.registry import parse_parameters
 
 
 def allocation_payload(body: AllocationRequest, services: Services) -> dict[str, Any]:
+    """Return the payload of a job of this service; see :func:`payload_of`."""
+    return payload_of(body, services.settings, services.database.url)
+
+
+def payload_of(body: AllocationRequest, settings: Settings, library_url: str) -> dict[str, Any]:
     """Return what makes an allocation what it is; the time that it has is not a part of it.
+
+    Parameters
+    ----------
+    body
+        What is asked for.
+    settings
+        The sizes that are taken.
+    library_url
+        Database of the policy library.
 
     Raises
     ------
@@ -22,11 +37,11 @@ def allocation_payload(body: AllocationRequest, services: Services) -> dict[str,
         If there is no such algorithm, or its parameters are unknown or out of range.
     """
     payload = {
-        "problem": problem_to_record(to_problem(body, services.settings)),
+        "problem": problem_to_record(to_problem(body, settings)),
         "algorithm": body.algorithm,
         "parameters": parse_parameters(body.algorithm, body.parameters).model_dump(mode="json"),
         "seed": body.seed,
-        "library_url": services.database.url,
+        "library_url": library_url,
     }
     if body.keep_checkpoint:
         payload["keep_checkpoint"] = True

@@ -13,6 +13,7 @@ from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI
 from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
 import app
 from app.api import stored_json
@@ -57,6 +58,9 @@ _WARM_UP, _WARM_UP_RESERVE = "app.jobs.warm_up:warm_up", "app.jobs.warm_up:warm_
 _REQUEST_THREADS = 8
 _SEARCHES_LEAVE = 5
 """Niceness of the workers: a third of a core's time where somebody else has something to do on it."""
+_COMPRESSED_FROM_BYTES = 8_192
+# Streams, whose lines would wait for each other, and weights, which are as small as they get.
+_SENT_AS_IT_IS = (*DEFAULT_EXCLUDED_CONTENT_TYPES, batch.NDJSON, "application/octet-stream")
 _REQUEST_ID = re.compile(r"[A-Za-z0-9._~+/=-]{1,128}")
 
 
@@ -81,7 +85,7 @@ def create_application(settings: Settings) -> FastAPI:
             store = PolicyLibrary(database, limits)
             store.migrate()
             # What is shipped is taken in whatever is set for what strangers send.
-            seed_library(PolicyLibrary(database), database)
+            seed_library(PolicyLibrary(database))
             keys = KeyStore(database)
             keys.migrate()
             service = JobService(
@@ -183,6 +187,12 @@ def _middleware(settings: Settings, metrics: Metrics) -> list[Middleware]:
         Middleware(CorrelationIdMiddleware, validator=lambda given: _REQUEST_ID.fullmatch(given) is not None),
         Middleware(RequestLog, metrics=metrics),
         Middleware(SecurityHeaders),
+        Middleware(
+            GZipMiddleware,
+            minimum_size=_COMPRESSED_FROM_BYTES,
+            compresslevel=5,
+            exclude_content_types=_SENT_AS_IT_IS,
+        ),
     ]
     if settings.cors_origins:
         listed.append(

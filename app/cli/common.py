@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,19 +11,30 @@ from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
+from sqlalchemy.exc import SQLAlchemyError
 
 from app.api.access.keys import KeyStore
+from app.api.errors import RequestError
 from app.domain.errors import AllocatorError
 from app.reproduction.errors import ReproductionError
 from app.settings import Settings
 from policy_store.database import Database
+from policy_store.errors import PolicyStoreError
 from policy_store.library import PolicyLibrary
+
+_PREFIX = "ALLOCATOR_"
 
 DataDir = Annotated[Path | None, typer.Option(help="Folder of the database; made where it is missing.")]
 
 
 def read_settings(**given: Any) -> Settings:
-    """Read the settings; what the command line gives comes first."""
+    """Read the settings; what the command line gives comes first, and unknown variables are told of."""
+    for name in sorted(os.environ):
+        if name.startswith(_PREFIX) and name.removeprefix(_PREFIX).lower() not in Settings.model_fields:
+            known = [f"{_PREFIX}{field.upper()}" for field in Settings.model_fields]
+            near = difflib.get_close_matches(name, known, 1)
+            guess = f"; did you mean {near[0]}?" if near else ""
+            typer.echo(f"{name} is no setting, and is ignored{guess}", err=True)
     try:
         return Settings(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
@@ -66,9 +79,11 @@ def refusals() -> Iterator[None]:
             f"/{'/'.join(map(str, e['loc']))}: {e['msg']}"
             for e in error.errors(include_url=False, include_input=False)
         ]
+    except RequestError as error:
+        lines = [f"{e.pointer or 'the request'}: {e.detail}" for e in error.errors] or [error.detail]
     except AllocatorError as error:
         lines = [f"{v.pointer}: {v.detail}" for v in error.violations] or [error.detail]
-    except (OSError, ValueError, ReproductionError) as error:
+    except (OSError, ValueError, ReproductionError, PolicyStoreError, SQLAlchemyError) as error:
         lines = [str(error)]
     for line in lines:
         typer.echo(line, err=True)

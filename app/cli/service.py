@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from sqlalchemy import make_url
@@ -15,11 +14,12 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from app.api.access.keys import KeyStore
 from app.api.allocation_models import Allocation, AllocationRequest
-from app.api.problem_models import to_problem
+from app.api.allocation_payload import payload_of
+from app.api.body_validation import BodyValidator
+from app.api.json_body import parse_json
 from app.api.server import Server
 from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
 from app.cli.progress import bar
-from app.domain.records import problem_to_record
 from app.jobs import model
 from app.jobs.owner import new_owner
 from app.jobs.store import JobStore
@@ -29,7 +29,6 @@ from app.logs import configure_logs
 from app.memory import limit_arenas
 from app.processors import usable_processors
 from app.settings import Settings
-from app.solvers.registry import parse_parameters
 from policy_store.backup import back_up
 from policy_store.database import Database
 from policy_store.errors import BackupFailed, PolicyStoreError
@@ -99,23 +98,19 @@ def allocate(
     started = time.monotonic()
     settings = read_settings(data_dir=data_dir)
     with refusals():
-        body = json.loads(sys.stdin.read() if str(file) == "-" else file.read_text(encoding="utf-8"))
+        body = parse_json(sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes())
         given = {"algorithm": algorithm, "seed": seed, "time_limit_s": time_limit_s}
-        body |= {name: value for name, value in given.items() if value is not None}
+        given = {name: value for name, value in given.items() if value is not None}
         if parameters is not None:
-            body["parameters"] = json.loads(parameters)
-        request = AllocationRequest.model_validate(body)
-        payload = {
-            "problem": problem_to_record(to_problem(request, settings)),
-            "algorithm": request.algorithm,
-            "parameters": parse_parameters(request.algorithm, request.parameters).model_dump(mode="json"),
-            "seed": request.seed,
-            "library_url": settings.resolved_database_url,
-            "threads": settings.threads_per_job,
-            "bound_time_limit_s": request.bound_seconds,
-        }
-        with open_library(settings) as (library, database):
-            seed_library(library, database)
+            given["parameters"] = parse_json(parameters.encode("utf-8", "surrogateescape"))
+        if isinstance(body, dict):
+            body |= given
+        request = BodyValidator(AllocationRequest).validate(body, settings)
+        assert isinstance(request, AllocationRequest)
+        payload = payload_of(request, settings, settings.resolved_database_url)
+        payload["threads"] = settings.threads_per_job
+        with open_library(settings) as (library, _):
+            seed_library(library)
         # Loads compiled code and torch, which a call for help or a mistake need not wait for.
         from app.jobs import work  # noqa: PLC0415 - slow to load
 

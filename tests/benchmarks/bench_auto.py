@@ -79,7 +79,7 @@ def library(folder: Path) -> str:
     database = Database(url)
     store = PolicyLibrary(database)
     store.migrate()
-    seed_library(store, database)
+    seed_library(store)
     database.dispose()
     return url
 

@@ -1,10 +1,12 @@
 """Library entries of checkpoints, and an empty library that begins with the shipped ones."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from safetensors.numpy import save
+from sqlalchemy import text
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_to_record
@@ -95,14 +97,14 @@ def test_name_that_cannot_be_stored():
         new_policy("", task(), checkpoint(task()))
 
 
-def test_shipped_policies_are_put_into_an_empty_library_once(library, database, shipped):
+def test_shipped_policies_are_put_into_an_empty_library_once(library, shipped):
     problems = {"b-town": task(1), "a-town": task(2)}
     for name, problem in problems.items():
         (shipped / f"{name}.safetensors").write_bytes(checkpoint(problem, name=name.upper()))
     (shipped / "README.md").write_text("not a policy")
 
-    assert seeding.seed_library(library, database) == 2
-    assert seeding.seed_library(library, database) == 0
+    assert seeding.seed_library(library) == 2
+    assert seeding.seed_library(library) == 0
 
     for name, problem in problems.items():
         policy = library.get(name)
@@ -112,25 +114,81 @@ def test_shipped_policies_are_put_into_an_empty_library_once(library, database, 
     assert library.count() == 2
 
 
-def test_library_that_has_a_policy_is_left_alone(library, database, shipped):
-    (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
+def test_a_new_version_brings_its_policies_and_deleted_ones_stay_deleted(library, shipped):
     library.add(new_policy("own", task(), checkpoint(task()), policy_id="own"))
+    (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
+    assert seeding.seed_library(library) == 1
 
-    assert seeding.seed_library(library, database) == 0
+    library.delete("a-town")
+    assert seeding.seed_library(library) == 0
+    (shipped / "b-town.safetensors").write_bytes(checkpoint(task(1)))
+    # Weights that are shipped anew under an old id are not put over those there are.
+    (shipped / "a-town.safetensors").write_bytes(checkpoint(task(2)))
+    assert seeding.seed_library(library) == 1
+    assert seeding.seed_library(library) == 0
     with pytest.raises(PolicyNotFound):
         library.get("a-town")
 
+    for policy_id in ("own", "b-town"):
+        library.delete(policy_id)
+    assert seeding.seed_library(library) == 0
+    assert library.count() == 0
 
-def test_one_damaged_file_keeps_all_out(library, database, shipped):
+
+def test_an_id_that_somebody_has_taken_is_left_to_them(library, shipped):
+    own = new_policy("own", task(), checkpoint(task()), policy_id="a-town")
+    library.add(own)
+    for name in ("a-town", "b-town"):
+        (shipped / f"{name}.safetensors").write_bytes(checkpoint(task(7), name=name))
+    assert seeding.seed_library(library) == 1
+    assert library.get("a-town").name == "own"
+    library.delete("a-town")
+    assert seeding.seed_library(library) == 0
+
+
+@pytest.mark.parametrize("used", [False, True])
+def test_a_library_of_a_version_without_records_gets_only_what_is_new(database, shipped, used):
+    """What it had seeded is not known, so all that could have been counts as deleted."""
+    before = "uniform-5x10x3"
+    for name in (before, "new-town"):
+        (shipped / f"{name}.safetensors").write_bytes(checkpoint(task(), name=name))
+    library = PolicyLibrary(database)
+    library.migrate()
+    with database.write() as connection:
+        connection.execute(text("DROP TABLE seeded_policies"))
+        connection.execute(text("UPDATE alembic_version_library SET version_num = '0001'"))
+        if used:
+            connection.execute(text("UPDATE library_revision SET revision = 35"))
+    library.migrate()
+
+    assert seeding.seed_library(library) == (1 if used else 2)
+    assert library.count() == (1 if used else 2)
+    assert library.get("new-town")
+
+
+def test_what_was_shipped_before_there_were_records_is_known():
+    folder = Path(seeding.__file__).parent / "seed"
+    assert {file.stem for file in folder.glob("*.safetensors")} >= seeding.SHIPPED_BEFORE
+    assert len(seeding.SHIPPED_BEFORE) == 35
+
+
+def test_nothing_is_read_of_what_is_known(library, shipped):
+    (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
+    assert seeding.seed_library(library) == 1
+    (shipped / "a-town.safetensors").write_bytes(b"damaged")
+    assert seeding.seed_library(library) == 0
+
+
+def test_one_damaged_file_keeps_all_out(library, shipped):
     (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
     (shipped / "b-town.safetensors").write_bytes(checkpoint(task(), task={"uavs": []}))
 
     with pytest.raises(InvalidCheckpoint, match=r"b-town\.safetensors"):
-        seeding.seed_library(library, database)
+        seeding.seed_library(library)
     assert library.count() == 0
 
 
-def test_without_shipped_policies_the_library_stays_empty(library, database, shipped):
-    assert seeding.seed_library(library, database) == 0
+def test_without_shipped_policies_the_library_stays_empty(library, shipped):
+    assert seeding.seed_library(library) == 0
     shipped.rmdir()
-    assert seeding.seed_library(library, database) == 0
+    assert seeding.seed_library(library) == 0

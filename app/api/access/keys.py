@@ -10,6 +10,7 @@ import hashlib
 import hmac
 import secrets
 import time
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -24,6 +25,9 @@ MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_access"
 
 _ID_BYTES, _SECRET_BYTES = 6, 32
+_LONGEST_NAME = 256
+
+_NOT_IN_A_LINE = frozenset({"Cc", "Cs", "Zl", "Zp"})
 
 metadata = sa.MetaData()
 
@@ -31,7 +35,7 @@ api_keys = sa.Table(
     "api_keys",
     metadata,
     sa.Column("id", sa.String(12), primary_key=True),
-    sa.Column("name", sa.String(256), nullable=False),
+    sa.Column("name", sa.String(_LONGEST_NAME), nullable=False),
     sa.Column("role", sa.String(16), nullable=False),
     sa.Column("digest", sa.LargeBinary(32), nullable=False),
     sa.Column("created_at", sa.Double, nullable=False),
@@ -104,6 +108,11 @@ class KeyStore:
     def create(self, name: str, role: Role) -> tuple[ApiKey, str]:
         """Make a key.
 
+        Raises
+        ------
+        ValueError
+            If the name is empty, longer than a name, or has tabs, line breaks or other control characters.
+
         Returns
         -------
         key
@@ -111,6 +120,10 @@ class KeyStore:
         token
             What a client sends; it is nowhere else and cannot be had again.
         """
+        if not 1 <= len(name) <= _LONGEST_NAME:
+            raise ValueError(f"a name of {len(name)} characters, not of 1 to {_LONGEST_NAME}")
+        if in_a_line(name) != name:
+            raise ValueError(f"the name {name!r} has tabs, line breaks or other control characters")
         secret = secrets.token_urlsafe(_SECRET_BYTES)
         key = ApiKey(
             secrets.token_hex(_ID_BYTES), name, role, _digest(secret), datetime.now(UTC), revoked_at=None
@@ -152,6 +165,11 @@ class KeyStore:
             )
             for row in rows
         ]
+
+
+def in_a_line(name: str) -> str:
+    """Write a name without what would break a line of a list or a terminal."""
+    return "".join("\ufffd" if unicodedata.category(each) in _NOT_IN_A_LINE else each for each in name)
 
 
 def recognise(token: str, keys: Mapping[str, ApiKey]) -> ApiKey | None:

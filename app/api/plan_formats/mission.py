@@ -46,6 +46,7 @@ class Command(IntEnum):
 class Frame(IntEnum):
     """The MAV_FRAMEs that are used."""
 
+    GLOBAL = 0
     MISSION = 2
     RELATIVE_ALTITUDE = 3
     TERRAIN_ALTITUDE = 10

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
 
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
 
@@ -120,22 +125,31 @@ def _map(plan: FlownPlan) -> str:
 
 def _shapes(plan: FlownPlan) -> Iterator[str]:
     problem = plan.problem
-    xs = [x for u in problem.uavs for x in (u.x_s, u.x_c)] + [t.x for t in problem.targets]
+    given = [x for u in problem.uavs for x in (u.x_s, u.x_c)] + [t.x for t in problem.targets]
+    # One map without the jump at the antimeridian; places are drawn where it has them.
+    xs = _unrolled(problem.crs, np.array(given))
+    on_map = dict(zip(given, xs.tolist(), strict=True))
+    around = 360.0 if problem.crs == "wgs84" else math.inf
     ys = [y for u in problem.uavs for y in (u.y_s, u.y_c)] + [t.y for t in problem.targets]
-    span_x, span_y = max(xs) - min(xs) or 1.0, max(ys) - min(ys) or 1.0
+    west, south = float(xs.min()), min(ys)
+    span_x, span_y = float(xs.max()) - west or 1.0, max(ys) - south or 1.0
     scale = min((_WIDTH - 2 * _MARGIN) / span_x, (_HEIGHT - 2 * _MARGIN) / span_y)
     left = (_WIDTH - scale * span_x) / 2
     bottom = (_HEIGHT + scale * span_y) / 2
 
+    def place(x: float, y: float) -> tuple[float, float]:
+        return left + (x - west) * scale, bottom - (y - south) * scale
+
     def at(x: float, y: float) -> tuple[float, float]:
-        return left + (x - min(xs)) * scale, bottom - (y - min(ys)) * scale
+        return place(on_map[x], y)
 
     for route in plan.flying:
         uav = route.uav
         places = [(uav.x_c, uav.y_c), *((stop.target.x, stop.target.y) for stop in route.stops)]
         places.append((uav.x_s, uav.y_s))
-        points = " ".join("{:.1f},{:.1f}".format(*at(x, y)) for x, y in places)
-        yield f'<polyline points="{points}" fill="none" stroke="{_colour(route)}" stroke-width="1.5"/>'
+        for line in _lines([(on_map[x], y) for x, y in places], around):
+            points = " ".join("{:.1f},{:.1f}".format(*place(x, y)) for x, y in line)
+            yield f'<polyline points="{points}" fill="none" stroke="{_colour(route)}" stroke-width="1.5"/>'
     for target in problem.targets:
         x, y = at(target.x, target.y)
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#fff" stroke="#111"/>'
@@ -143,3 +157,29 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
     for x_s, y_s in {(uav.x_s, uav.y_s) for uav in problem.uavs}:
         x, y = at(x_s, y_s)
         yield f'<path d="M{x:.1f} {y - 6:.1f}l5 9h-10z" fill="#111"/>'
+
+
+def _unrolled(crs: str, xs: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return x without the jump of longitudes at the antimeridian: those east of it become more than 180."""
+    if crs == "local":
+        return xs
+    around = np.sort(xs)
+    gaps = np.diff(around, append=around[0] + 360.0)
+    widest = int(gaps.argmax())
+    # Where nothing is gained the map begins at the antimeridian, as maps do.
+    if gaps[widest] <= gaps[-1]:
+        return xs
+    west = around[widest + 1]
+    return np.where(xs < west, xs + 360.0, xs)
+
+
+def _lines(places: Sequence[tuple[float, float]], around: float) -> Iterator[list[tuple[float, float]]]:
+    """Draw legs the shorter way round: one that leaves the map at an edge comes in at the other."""
+    line = [places[0]]
+    for (x_a, y_a), (x_b, y_b) in pairwise(places):
+        if abs(x_b - x_a) > around / 2:
+            turn = math.copysign(around, x_b - x_a)
+            yield [*line, (x_b - turn, y_b)]
+            line = [(x_a + turn, y_a)]
+        line.append((x_b, y_b))
+    yield line

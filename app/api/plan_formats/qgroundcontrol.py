@@ -56,7 +56,8 @@ def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
 
 
 def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
-    """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots expect.
+    """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots
+    expect: in the global frame, since no other altitude is measured from anything else.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
         As :func:`~app.api.plan_formats.mission.mission` does.
     """
     home = MissionItem(
-        Command.WAYPOINT, Frame.RELATIVE_ALTITUDE, (0.0, 0.0, 0.0, 0.0), (route.uav.x_s, route.uav.y_s, 0.0)
+        Command.WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), (route.uav.x_s, route.uav.y_s, 0.0)
     )
     lines = ["QGC WPL 110"]
     for number, item in enumerate((home, *mission(route, choices))):

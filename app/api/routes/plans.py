@@ -59,9 +59,15 @@ class _FlightFile:
     ending: str
 
 
+def _for_spreadsheets(plan: FlownPlan) -> str:
+    """Write CSV with a byte order mark where a spreadsheet would take it for another encoding."""
+    table = csv_table(plan)
+    return table if table.isascii() else "\ufeff" + table
+
+
 _FORMATS: dict[PlanFormat, _Document | _FlightFile] = {
     PlanFormat.GEOJSON: _Document(geojson, GEOJSON, "geojson"),
-    PlanFormat.CSV: _Document(csv_table, "text/csv; charset=utf-8", "csv"),
+    PlanFormat.CSV: _Document(_for_spreadsheets, "text/csv; charset=utf-8", "csv"),
     PlanFormat.HTML: _Document(printed_page, "text/html; charset=utf-8", "html"),
     PlanFormat.QGC_PLAN: _FlightFile(plan_file, "application/json", "plan"),
     PlanFormat.QGC_WPL: _FlightFile(waypoint_file, "text/plain; charset=utf-8", "waypoints"),
