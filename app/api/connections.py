@@ -26,8 +26,8 @@ MOST_CONNECTIONS = 4_096
 """More than that many clients are not served by one machine; each may have sent 64 KB of a header."""
 
 _KEPT_SHARE, _KEPT_FEWEST, _FEWEST_CONNECTIONS = 4, 64, 8
-_CHUNKS_A_TURN = 64
-_TURNS_S = 0.005
+_CHUNKS_A_TURN = 32
+_TURNS_S = 0.002
 _LINGER_S = 1.0
 _TOLD_EVERY_S = 10.0
 
