@@ -25,6 +25,7 @@ from app.api.connections import raise_descriptor_limit
 from app.api.dashboard import install_dashboard
 from app.api.documentation import DESCRIPTION, TAGS, install_documentation, operation_id
 from app.api.error_handlers import install_error_handlers
+from app.api.error_types import install_error_types
 from app.api.head_requests import HeadRequests
 from app.api.job_kinds import BATCH, job_kinds
 from app.api.json_body import BodyLimit
@@ -133,6 +134,7 @@ def create_application(settings: Settings) -> FastAPI:
         application.include_router(room.router)
     install_error_handlers(application)
     install_dashboard(application, settings)
+    install_error_types(application)
     install_documentation(application, settings)
     return application
 

@@ -25,8 +25,8 @@ Who flies where, with what: plans for swarms of UAVs that carry relief materials
 "Task Allocation of Multiple Unmanned Aerial Vehicles Based on Deep Transfer Reinforcement Learning",
 Drones 2022, 6(8), 215.
 
-Errors are problem details (RFC 9457). Every response has an `X-Request-ID`, which is the request's if it
-has one. A service that keys were made for needs one with every request:
+Errors are problem details (RFC 9457), of [these types](docs/errors). Every response has an `X-Request-ID`,
+which is the request's if it has one. A service that keys were made for needs one with every request:
 `Authorization: Bearer …`.
 """
 

@@ -16,7 +16,7 @@ _SUFFIX = ".json"
 _SHORT_PARAMETERS: dict[str, dict[str, Any]] = {"qmix": {"n_epochs": 2000}, "dqn": {"n_epochs": 2000}}
 """What takes minutes by the paper's numbers is shortened."""
 
-_SMALL_TASK = {
+_SMALL_TASK: dict[str, Any] = {
     "uavs": [
         {"x_s": 0.1, "y_s": 0.2, "speed": 1.0, "voyage": 3.0, "loadlist": [5, 2]},
         {"x_s": 0.8, "y_s": 0.4, "speed": 1.2, "voyage": 2.5, "loadlist": [3, 6]},
@@ -63,10 +63,38 @@ def _allocation_example(name: str) -> dict[str, Any]:
     return {"algorithm": name, **({"parameters": parameters} if parameters else {}), **problem}
 
 
+def _mid_mission() -> dict[str, Any]:
+    """A swarm on its way: one UAV between two areas, one that is returning, and what is left of the needs."""
+    first, second = _SMALL_TASK["uavs"]
+    on_its_way = {**first, "x_c": 0.3, "y_c": 0.9, "dis": 0.73, "loadlist": [3, 1]}
+    left = [{"x": 0.6, "y": 0.1, "level": 0.4, "loadlist": [1, 3]}, *_SMALL_TASK["targets"][2:]]
+    return {**_SMALL_TASK, "uavs": [on_its_way, {**second, "ret": 1}], "targets": left, "algorithm": "auto"}
+
+
 ALLOCATION_EXAMPLES: dict[str, Example] = {
-    algorithm.name: Example(summary=algorithm.summary, value=_allocation_example(algorithm.name))
-    for algorithm in ALGORITHMS.values()
+    "cyclone-idai": Example(
+        summary="A real case: what Cyclone Idai left to be done around Beira, answered within two seconds",
+        value={**example_problem("cyclone-idai"), "algorithm": "auto", "time_limit_s": 2},
+    ),
+    "planned-unloading": Example(
+        summary="How much a visit unloads is decided with the plan; with a bound on what any plan earns",
+        value={
+            **_SMALL_TASK,
+            "objective": {"unloading": "planned", "distance_weight": 1.0},
+            "algorithm": "auto",
+            "time_limit_s": 1,
+            "bound": True,
+        },
+    ),
+    "mid-mission": Example(summary="A swarm that is on its way already", value=_mid_mission()),
+    **{
+        algorithm.name: Example(summary=algorithm.summary, value=_allocation_example(algorithm.name))
+        for algorithm in ALGORITHMS.values()
+    },
 }
+
+ALLOCATION_ANSWER: dict[str, Any] = json.loads((_FOLDER / "answers" / "small-greedy.json").read_text("utf-8"))
+"""What the greedy rule answers to the small task; a test compares."""
 
 REGISTRATION_EXAMPLES: dict[str, Example] = {
     "train": Example(

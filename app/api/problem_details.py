@@ -61,6 +61,51 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "damaged-checkpoint": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
 
+ERROR_PAGE = "/docs/errors"
+"""Where the meanings are shown."""
+
+MEANINGS: Mapping[str, str] = {
+    "malformed-json": "The body is not JSON in UTF-8, or has a name twice in one object",
+    "bad-request": "The request is not HTTP as it should be",
+    "unauthenticated": "An API key is needed, or the one that was sent is unknown or revoked",
+    "forbidden": "The API key has not the role that this needs",
+    "host-not-allowed": "The header Host does not name this service",
+    "not-found": "There is nothing at this path",
+    "method-not-allowed": "This path has other methods, which Allow lists",
+    "request-timeout": "The request was not received in time",
+    "body-too-large": "The body has more bytes than the operator takes",
+    "unsupported-media-type": "The body is not sent as plain application/json",
+    "invalid-request": "Fields or parameters are missing, unknown, of another type or out of range",
+    "invalid-cursor": "No page has given this cursor out",
+    "invalid-problem": "The problem breaks a rule between its fields",
+    "unknown-algorithm": "No algorithm has this name",
+    "invalid-parameters": "The algorithm has no such parameters, or not with these values",
+    "problem-too-large": "The problem is larger than the operator or the algorithm takes",
+    "batch-too-large": "The batch has more problems than the operator takes",
+    "invalid-checkpoint": "The checkpoint is not exactly what its architecture needs",
+    "no-compatible-source": "The library has no policy that fits; `sizes` has the sizes there are",
+    "job-not-found": "No job has this id; ended ones are deleted after a time",
+    "idempotency-key-reused": "The Idempotency-Key came with another request before",
+    "job-cancelled": "The job was cancelled before it had a plan",
+    "job-without-checkpoint": "The job has learned nothing that could be registered",
+    "uav-not-found": "No UAV of the plan has this id",
+    "no-plan": "The job has no plan, or not yet",
+    "nothing-to-fly": "The UAV, or all of them, stay where they are",
+    "plan-not-geographic": "Flight files need a problem with crs wgs84",
+    "plan-out-of-range": "A flight file cannot hold the plan, or the UAV not fly it as asked",
+    "queue-full": "As many jobs wait as may; Retry-After says when to come back",
+    "draining": "The service is stopping",
+    "not-ready": "The database or the workers do not answer yet",
+    "time-limit-exceeded": "No plan was there when the time was up",
+    "store-unavailable": "The database does not answer",
+    "policy-not-found": "The library has no policy with this id",
+    "duplicate-policy": "Another policy has this id",
+    "invalid-policy": "A field of the policy cannot be stored",
+    "damaged-checkpoint": "The stored weights are not those that were registered",
+    "internal-error": "The service has a defect, or its machine is in trouble",
+}
+"""What each type means, for people."""
+
 MAX_LISTED_ERRORS = 100
 """A request of a thousand wrong numbers is told of the first hundred."""
 
@@ -83,7 +128,10 @@ class ProblemDetails(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
-    type: str = Field(description="Stable name of the problem", examples=["invalid-request"])
+    type: str = Field(
+        description=f"Stable name of the problem; `{ERROR_PAGE}` says what each means",
+        examples=["invalid-request"],
+    )
     title: str = Field(description="The same for people", examples=["Unprocessable Entity"])
     status: int = Field(description="HTTP status", examples=[422])
     detail: str = Field(description="What is wrong with this request")
@@ -164,7 +212,40 @@ def responses(*codes: str) -> dict[int | str, dict[str, Any]]:
     return {
         status: {
             "description": f"{HTTPStatus(status).phrase}: {', '.join(f'`{name}`' for name in names)}",
-            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails"}}},
+            "content": {
+                MEDIA_TYPE: {
+                    "schema": {"$ref": "#/components/schemas/ProblemDetails"},
+                    "examples": {name: {"value": _example(name)} for name in names},
+                }
+            },
         }
         for status, names in sorted(types.items())
     }
+
+
+_EXAMPLE_ERRORS: Mapping[str, Sequence[Mapping[str, str]]] = {
+    "invalid-request": (
+        {"pointer": "/uavs/0/speed", "detail": "is -5, must be at least 1e-09"},
+        {
+            "pointer": "/targets/2/priority",
+            "detail": "unknown field `priority`; there are id, x, y, level, loadlist, deadline, service_time",
+        },
+    ),
+    "invalid-problem": ({"pointer": "/uavs/1/id", "detail": "'uav-1' is already the id of number 0"},),
+    "problem-too-large": ({"pointer": "/uavs", "detail": "1200 UAVs, at most 1000 are taken"},),
+}
+
+
+def _example(code: str) -> dict[str, Any]:
+    """Show the problem of a type as a request might get it."""
+    status, errors = status_of(code), _EXAMPLE_ERRORS.get(code, ())
+    detail = f"{errors[0]['pointer']}: {errors[0]['detail']}" if errors else MEANINGS[code]
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    example = {
+        "type": code,
+        "title": status.phrase,
+        "status": status.value,
+        "detail": detail + more,
+        "instance": "/allocate",
+    }
+    return example | ({"errors": [dict(each) for each in errors]} if errors else {})

@@ -13,7 +13,13 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.api.openapi_examples import ALLOCATION_EXAMPLES, REGISTRATION_EXAMPLES, SIMILAR_EXAMPLES
+from app.api.openapi_examples import (
+    ALLOCATION_EXAMPLES,
+    BATCH_EXAMPLES,
+    REGISTRATION_EXAMPLES,
+    SIMILAR_EXAMPLES,
+)
+from app.api.problem_details import MEANINGS, STATUS_OF_CODE
 
 ROOT = Path(__file__).parents[2]
 ASYNC = {"Prefer": "respond-async"}
@@ -198,7 +204,8 @@ def test_description_has_an_example_for_each_algorithm(client):
     def examples(path):
         return description["paths"][path]["post"]["requestBody"]["content"]["application/json"]["examples"]
 
-    assert set(examples("/allocate")) == algorithms == set(ALLOCATION_EXAMPLES)
+    assert set(examples("/allocate")) == algorithms | {"cyclone-idai", "planned-unloading", "mid-mission"}
+    assert set(examples("/allocate")) == set(ALLOCATION_EXAMPLES)
     assert set(examples("/library")) == {"checkpoint", "train", "job_id"} == set(REGISTRATION_EXAMPLES)
     similar = client.post("/library/similar", json=SIMILAR_EXAMPLES["paper"]["value"])
     assert similar.status_code == 200
@@ -213,3 +220,51 @@ def test_documentation_page_loads_nothing_from_elsewhere(client):
         assert place.startswith("/docs/assets/")
         assert client.get(place).status_code == 200
     assert "/openapi.json" in page
+
+
+def test_every_type_of_error_has_a_meaning_and_an_example(client):
+    assert MEANINGS.keys() == STATUS_OF_CODE.keys() | {"internal-error"}
+    page = client.get("/docs/errors").text
+    assert set(re.findall(r'<tr id="([^"]+)"', page)) == MEANINGS.keys()
+    assert not re.findall(r'(?:src|href)="', page)
+    shown = set()
+    for operations in client.get("/openapi.json").json()["paths"].values():
+        for operation in operations.values():
+            for status, response in operation["responses"].items():
+                content = response.get("content", {}).get("application/problem+json", {})
+                for code, example in content.get("examples", {}).items():
+                    assert example["value"]["type"] == code
+                    assert str(example["value"]["status"]) == status
+                    shown.add(code)
+    assert {"invalid-request", "unauthenticated", "no-compatible-source", "queue-full"} <= shown
+
+
+def test_the_example_of_an_answer_is_the_answer(client):
+    description = client.get("/openapi.json").json()
+    content = description["paths"]["/allocate"]["post"]["responses"]["200"]["content"]["application/json"]
+    example = content["example"]
+    request = {**BATCH_EXAMPLES["two"]["value"]["problems"][0]}
+    request.pop("id")
+    answer = client.post("/allocate", json=request).json()
+    for name, value in example.items():
+        if name not in ("job_id", "elapsed_s", "unmet"):
+            assert answer[name] == (pytest.approx(value) if isinstance(value, float) else value), name
+    assert [each["target_id"] for each in answer["unmet"]] == [each["target_id"] for each in example["unmet"]]
+
+
+def test_large_answers_are_compressed_and_streams_are_not(client, problem):
+    def encoding(path):
+        return client.get(path, headers={"Accept-Encoding": "gzip"}).headers.get("content-encoding")
+
+    assert encoding("/openapi.json") == encoding("/dashboard/js/main.js") == "gzip"
+    assert encoding("/healthz") is None
+    assert client.get("/openapi.json", headers={"Accept-Encoding": "identity"}).json()["openapi"]
+    policy = client.get("/library").json()["policies"][0]["id"]
+    assert encoding(f"/library/{policy}/checkpoint") is None
+    body = {"problems": [{**problem, "algorithm": "greedy"}] * 10}
+    with client.stream("POST", "/allocate/batch", json=body) as stream:
+        assert "content-encoding" not in stream.headers
+        assert len(list(stream.iter_lines())) == 10
+    job = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()["job_id"]
+    with client.stream("GET", f"/jobs/{job}/events") as stream:
+        assert "content-encoding" not in stream.headers

@@ -1,0 +1,49 @@
+"""The page of error types: for each what it means, at ``/docs/errors``, with an anchor of its name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+
+from fastapi import FastAPI
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+from app.api.problem_details import ERROR_PAGE, MEANINGS, status_of
+
+_STYLE = """
+body { font: 11pt/1.4 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: auto }
+td, th { text-align: left; vertical-align: top; padding: .3rem .6rem; border-bottom: 1px solid #bbb }
+:target td { background: #ffd }
+"""
+
+
+def install_error_types(application: FastAPI) -> None:
+    """Serve the page."""
+    page = error_page(MEANINGS)
+
+    async def show_errors(request: Request) -> HTMLResponse:  # noqa: ARG001 - a route's signature
+        return HTMLResponse(page)
+
+    application.add_route(ERROR_PAGE, show_errors, include_in_schema=False)
+
+
+def error_page(meanings: Mapping[str, str]) -> str:
+    """Write the page."""
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Error types</title>'
+        f"<style>{_STYLE}</style></head><body><h1>Error types</h1>"
+        "<p>An error is a problem of RFC 9457; its <code>type</code> is one of these names. What was wrong with "
+        "the request is in <code>detail</code>, and field by field in <code>errors</code>.</p>"
+        f"<table><tr><th>Type</th><th>Status</th><th>Meaning</th></tr>{''.join(_rows(meanings))}</table>"
+        "</body></html>\n"
+    )
+
+
+def _rows(meanings: Mapping[str, str]) -> Iterator[str]:
+    for code, meaning in meanings.items():
+        status = status_of(code)
+        yield (
+            f'<tr id="{code}"><td><code>{code}</code></td><td>{status.value} {escape(status.phrase)}</td>'
+            f"<td>{escape(meaning)}</td></tr>"
+        )
