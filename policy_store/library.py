@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,17 +30,8 @@ from policy_store.errors import (
 )
 from policy_store.policy import Neighbour, NewPolicy, Policy, PolicyPage, Vector, as_vector
 from policy_store.policy_cache import PolicyCache
-from policy_store.tables import (
-    checkpoints,
-    feature_vectors,
-    library_revision,
-    policies,
-    seeded_policies,
-)
+from policy_store.tables import checkpoints, feature_vectors, library_revision, policies
 from policy_store.vector_cache import VectorCache, vector_from_bytes, vector_to_bytes
-
-SEEDED_BEFORE = "*"
-"""Stands for all policies that were seeded by versions that kept no records of it."""
 
 _MIGRATIONS = Path(__file__).parent / "migrations"
 _VERSION_TABLE = "alembic_version_library"
@@ -136,40 +127,6 @@ class PolicyLibrary:
                 ]
                 writing.execute(insert(feature_vectors), vector_rows)
             return _get(writing, policy_id)
-
-    def seeded(self, connection: Connection | None = None) -> set[str]:
-        """Return the ids of all policies that were ever seeded.
-
-        :data:`SEEDED_BEFORE` is among them where a version without records has been at work.
-        """
-        query = select(seeded_policies.c.id)
-        if connection is not None:
-            return set(connection.execute(query).scalars())
-        with self._database.read() as reading:
-            return set(reading.execute(query).scalars())
-
-    def seed(self, policies: Sequence[NewPolicy]) -> int:
-        """Add policies that were never seeded before, all of them or none, and remember that they were.
-
-        One whose id was taken by a policy of somebody else's is left out for good.
-
-        Returns
-        -------
-        int
-            How many were added.
-        """
-        added = 0
-        with self._database.write() as connection:
-            _next_revision(connection)  # waits for another process that does the same
-            known = self.seeded(connection)
-            for new in policies:
-                if new.id is None or new.id in known:
-                    continue
-                if _find(connection, new.id) is None:
-                    self.add(new, connection)
-                    added += 1
-                connection.execute(insert(seeded_policies), {"id": new.id})
-        return added
 
     def get(self, policy_id: str) -> Policy:
         """Return a policy.

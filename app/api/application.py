@@ -86,7 +86,7 @@ def create_application(settings: Settings) -> FastAPI:
             store = PolicyLibrary(database, limits)
             store.migrate()
             # What is shipped is taken in whatever is set for what strangers send.
-            seed_library(PolicyLibrary(database))
+            seed_library(PolicyLibrary(database), database)
             keys = KeyStore(database)
             keys.migrate()
             service = JobService(

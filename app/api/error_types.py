@@ -12,7 +12,7 @@ from starlette.responses import HTMLResponse
 from app.api.problem_details import ERROR_PAGE, MEANINGS, status_of
 
 _STYLE = """
-body { font: 11pt/1.4 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem; margin: auto }
+body { font: 11pt/1.4 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem }
 td, th { text-align: left; vertical-align: top; padding: .3rem .6rem; border-bottom: 1px solid #bbb }
 :target td { background: #ffd }
 """
@@ -33,8 +33,8 @@ def error_page(meanings: Mapping[str, str]) -> str:
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Error types</title>'
         f"<style>{_STYLE}</style></head><body><h1>Error types</h1>"
-        "<p>An error is a problem of RFC 9457; its <code>type</code> is one of these names. What was wrong with "
-        "the request is in <code>detail</code>, and field by field in <code>errors</code>.</p>"
+        "<p>An error is a problem of RFC 9457; its <code>type</code> is one of these names. What was wrong "
+        "with the request is in <code>detail</code>, and field by field in <code>errors</code>.</p>"
         f"<table><tr><th>Type</th><th>Status</th><th>Meaning</th></tr>{''.join(_rows(meanings))}</table>"
         "</body></html>\n"
     )

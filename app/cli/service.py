@@ -109,8 +109,8 @@ def allocate(
         assert isinstance(request, AllocationRequest)
         payload = payload_of(request, settings, settings.resolved_database_url)
         payload["threads"] = settings.threads_per_job
-        with open_library(settings) as (library, _):
-            seed_library(library)
+        with open_library(settings) as (library, database):
+            seed_library(library, database)
         # Loads compiled code and torch, which a call for help or a mistake need not wait for.
         from app.jobs import work  # noqa: PLC0415 - slow to load
 

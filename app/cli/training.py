@@ -124,8 +124,8 @@ def _checkpoint(policy: str, settings: Settings) -> bytes:
     """Read the checkpoint of a policy, from a file or else from the library."""
     if Path(policy).is_file():
         return Path(policy).read_bytes()
-    with open_library(settings) as (library, _):
-        seed_library(library)
+    with open_library(settings) as (library, database):
+        seed_library(library, database)
         try:
             return library.checkpoint(policy)
         except PolicyNotFound:

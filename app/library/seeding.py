@@ -10,8 +10,9 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
 from app.library.entries import checkpoint_metadata, new_policy
 from policy_store.database import Database
-from policy_store.library import SEEDED_BEFORE, PolicyLibrary
+from policy_store.library import PolicyLibrary
 from policy_store.policy import NewPolicy
+from policy_store.seeding import SEEDED_BEFORE, seed, seeded_ids
 
 _SUFFIX = ".safetensors"
 
@@ -80,22 +81,29 @@ def read_policies(folder: Traversable, known: Collection[str] = ()) -> list[NewP
     return found
 
 
-def seed_library(library: PolicyLibrary) -> int:
+def seed_library(library: PolicyLibrary, database: Database) -> int:
     """Put the shipped policies into a library that were never put into it before.
 
     So a new version's come with it, and those that somebody has deleted stay deleted. Two processes may do so
     at the same time.
+
+    Parameters
+    ----------
+    library
+        The library.
+    database
+        The database it is in.
 
     Returns
     -------
     int
         How many were put in.
     """
-    known = library.seeded()
+    known = seeded_ids(database)
     if SEEDED_BEFORE in known:
         known |= SHIPPED_BEFORE
     new = shipped_policies(known)
-    return library.seed(new) if new else 0
+    return seed(library, database, new) if new else 0
 
 
 def add_policies(library: PolicyLibrary, database: Database, policies: Sequence[NewPolicy]) -> int:

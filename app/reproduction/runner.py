@@ -91,7 +91,7 @@ def _library(folder: Path) -> str:
     try:
         library = PolicyLibrary(database)
         library.migrate()
-        seed_library(library)
+        seed_library(library, database)
         return database.url
     finally:
         database.dispose()

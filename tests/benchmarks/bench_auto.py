@@ -79,7 +79,7 @@ def library(folder: Path) -> str:
     database = Database(url)
     store = PolicyLibrary(database)
     store.migrate()
-    seed_library(store)
+    seed_library(store, database)
     database.dispose()
     return url
 

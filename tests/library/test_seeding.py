@@ -97,14 +97,14 @@ def test_name_that_cannot_be_stored():
         new_policy("", task(), checkpoint(task()))
 
 
-def test_shipped_policies_are_put_into_an_empty_library_once(library, shipped):
+def test_shipped_policies_are_put_into_an_empty_library_once(library, database, shipped):
     problems = {"b-town": task(1), "a-town": task(2)}
     for name, problem in problems.items():
         (shipped / f"{name}.safetensors").write_bytes(checkpoint(problem, name=name.upper()))
     (shipped / "README.md").write_text("not a policy")
 
-    assert seeding.seed_library(library) == 2
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 2
+    assert seeding.seed_library(library, database) == 0
 
     for name, problem in problems.items():
         policy = library.get(name)
@@ -114,36 +114,36 @@ def test_shipped_policies_are_put_into_an_empty_library_once(library, shipped):
     assert library.count() == 2
 
 
-def test_a_new_version_brings_its_policies_and_deleted_ones_stay_deleted(library, shipped):
+def test_a_new_version_brings_its_policies_and_deleted_ones_stay_deleted(library, database, shipped):
     library.add(new_policy("own", task(), checkpoint(task()), policy_id="own"))
     (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
-    assert seeding.seed_library(library) == 1
+    assert seeding.seed_library(library, database) == 1
 
     library.delete("a-town")
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 0
     (shipped / "b-town.safetensors").write_bytes(checkpoint(task(1)))
     # Weights that are shipped anew under an old id are not put over those there are.
     (shipped / "a-town.safetensors").write_bytes(checkpoint(task(2)))
-    assert seeding.seed_library(library) == 1
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 1
+    assert seeding.seed_library(library, database) == 0
     with pytest.raises(PolicyNotFound):
         library.get("a-town")
 
     for policy_id in ("own", "b-town"):
         library.delete(policy_id)
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 0
     assert library.count() == 0
 
 
-def test_an_id_that_somebody_has_taken_is_left_to_them(library, shipped):
+def test_an_id_that_somebody_has_taken_is_left_to_them(library, database, shipped):
     own = new_policy("own", task(), checkpoint(task()), policy_id="a-town")
     library.add(own)
     for name in ("a-town", "b-town"):
         (shipped / f"{name}.safetensors").write_bytes(checkpoint(task(7), name=name))
-    assert seeding.seed_library(library) == 1
+    assert seeding.seed_library(library, database) == 1
     assert library.get("a-town").name == "own"
     library.delete("a-town")
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 0
 
 
 @pytest.mark.parametrize("used", [False, True])
@@ -161,7 +161,7 @@ def test_a_library_of_a_version_without_records_gets_only_what_is_new(database, 
             connection.execute(text("UPDATE library_revision SET revision = 35"))
     library.migrate()
 
-    assert seeding.seed_library(library) == (1 if used else 2)
+    assert seeding.seed_library(library, database) == (1 if used else 2)
     assert library.count() == (1 if used else 2)
     assert library.get("new-town")
 
@@ -172,23 +172,23 @@ def test_what_was_shipped_before_there_were_records_is_known():
     assert len(seeding.SHIPPED_BEFORE) == 35
 
 
-def test_nothing_is_read_of_what_is_known(library, shipped):
+def test_nothing_is_read_of_what_is_known(library, database, shipped):
     (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
-    assert seeding.seed_library(library) == 1
+    assert seeding.seed_library(library, database) == 1
     (shipped / "a-town.safetensors").write_bytes(b"damaged")
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 0
 
 
-def test_one_damaged_file_keeps_all_out(library, shipped):
+def test_one_damaged_file_keeps_all_out(library, database, shipped):
     (shipped / "a-town.safetensors").write_bytes(checkpoint(task()))
     (shipped / "b-town.safetensors").write_bytes(checkpoint(task(), task={"uavs": []}))
 
     with pytest.raises(InvalidCheckpoint, match=r"b-town\.safetensors"):
-        seeding.seed_library(library)
+        seeding.seed_library(library, database)
     assert library.count() == 0
 
 
-def test_without_shipped_policies_the_library_stays_empty(library, shipped):
-    assert seeding.seed_library(library) == 0
+def test_without_shipped_policies_the_library_stays_empty(library, database, shipped):
+    assert seeding.seed_library(library, database) == 0
     shipped.rmdir()
-    assert seeding.seed_library(library) == 0
+    assert seeding.seed_library(library, database) == 0
