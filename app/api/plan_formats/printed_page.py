@@ -8,9 +8,9 @@ from html import escape
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+from app.domain.geometry import unrolled
 
 _WIDTH, _HEIGHT, _MARGIN = 720.0, 440.0, 24.0
 _COLOURS = ("#0b6e99", "#b4451f", "#3d7a2a", "#7a3f9d", "#a17a00", "#00736b", "#a8325e", "#4a5568")
@@ -127,7 +127,7 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
     problem = plan.problem
     given = [x for u in problem.uavs for x in (u.x_s, u.x_c)] + [t.x for t in problem.targets]
     # One map without the jump at the antimeridian; places are drawn where it has them.
-    xs = _unrolled(problem.crs, np.array(given))
+    xs = unrolled(problem.crs, np.array(given))
     on_map = dict(zip(given, xs.tolist(), strict=True))
     around = 360.0 if problem.crs == "wgs84" else math.inf
     ys = [y for u in problem.uavs for y in (u.y_s, u.y_c)] + [t.y for t in problem.targets]
@@ -157,20 +157,6 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
     for x_s, y_s in {(uav.x_s, uav.y_s) for uav in problem.uavs}:
         x, y = at(x_s, y_s)
         yield f'<path d="M{x:.1f} {y - 6:.1f}l5 9h-10z" fill="#111"/>'
-
-
-def _unrolled(crs: str, xs: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return x without the jump of longitudes at the antimeridian: those east of it become more than 180."""
-    if crs == "local":
-        return xs
-    around = np.sort(xs)
-    gaps = np.diff(around, append=around[0] + 360.0)
-    widest = int(gaps.argmax())
-    # Where nothing is gained the map begins at the antimeridian, as maps do.
-    if gaps[widest] <= gaps[-1]:
-        return xs
-    west = around[widest + 1]
-    return np.where(xs < west, xs + 360.0, xs)
 
 
 def _lines(places: Sequence[tuple[float, float]], around: float) -> Iterator[list[tuple[float, float]]]:
