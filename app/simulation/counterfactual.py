@@ -1,25 +1,23 @@
-"""What a plan would earn with one more visit, in the problem as it is or in one that is a little easier.
-
-Routes are flown on the one simulator: in every step each UAV takes the next visit of its route that is legal,
-so what comes out is the reward of a legal plan, whatever the additional visit does to those after it.
-"""
+"""What a plan would earn with one more visit in a problem that is a little easier."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from decimal import ROUND_CEILING, Context, Decimal
 from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation import simulator
-from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.unloading import best_deliveries
+from app.domain.allocation import LaterDeadline, Relaxation
+from app.domain.problem import Problem
+from app.simulation.arrays import ProblemArrays
+from app.simulation.flown_plan import FlownPlan
+from app.simulation.insertion import MADE, gain_of_visit, gets_more
+from app.simulation.planned_insertion import MORE, SOME_KEPT, PlannedTrial, gain_of_planned_visit
 
-_WORK = 1_200_000
-"""Visits, UAVs and targets that all counterfactuals of an answer may go through: tens of milliseconds."""
+NO_VISIT = -1
+"""In place of a place in a route: nothing is inserted."""
 
-_PLANNED_COST = 30
-"""Times what planned unloading makes a counterfactual cost."""
+_DIGITS = Context(prec=6, rounding=ROUND_CEILING)
 
 
 class Outcome(NamedTuple):
@@ -27,150 +25,95 @@ class Outcome(NamedTuple):
 
     Attributes
     ----------
-    reward
-        What it earns.
-    elsewhere
-        What it earns at other targets, without distance.
+    gain
+        Change of the reward.
     helps
-        Whether the visited target gets more than before.
+        Whether the visit is legal, and the visited target gets more than before.
     """
 
-    reward: float
-    elsewhere: float
+    gain: float
     helps: bool
 
 
 class Counterfactuals:
-    """Evaluates one more visit, as often as there is time for.
+    """Flies a plan with one more visit.
 
     Parameters
     ----------
-    arrays
-        A stack of one problem; it is not changed.
-    target, length
-        (M, S) and (M,) routes of the plan.
+    problem, arrays
+        The problem, and the same as a stack of one; they are not changed.
+    plan, trial
+        Its plan, and scratch space for it.
     planned
         Whether unloading is planned.
-    remaining
-        (N,) what each target needs after the plan, over all materials.
-    hurry
-        When true, no more are evaluated.
     """
 
     def __init__(
-        self,
-        arrays: ProblemArrays,
-        target: Integers,
-        length: Integers,
-        planned: bool,
-        remaining: Floats,
-        hurry: Callable[[], bool],
+        self, problem: Problem, arrays: ProblemArrays, plan: FlownPlan, trial: PlannedTrial, planned: bool
     ) -> None:
-        # Copies of what a counterfactual may relax, with one step more than there is.
+        self._index = {target.id: j for j, target in enumerate(problem.targets)}
+        self._given, self._plan, self._trial, self._planned = arrays, plan, trial, planned
+        # Copies of what a relaxation may change.
         self._arrays = arrays._replace(
             voyage=arrays.voyage.copy(),
             deadline=arrays.deadline.copy(),
             load=arrays.load.copy(),
             max_steps=arrays.max_steps.copy(),
         )
-        m, n, _ = arrays.shape
-        self._routes = np.full((m, target.shape[1] + 1), n, np.int64)
-        self._routes[:, :-1] = target
-        self._length, self._planned, self._remaining = length.copy(), planned, remaining
-        self._episodes = simulator.new_episodes(self._arrays, 1)
-        self._actions = np.empty((target.shape[1] + 1, m), np.int64)
-        self._cursor = np.empty(m, np.int64)
-        cost = int(length.sum()) + m + n
-        self._left = _WORK // (cost * (_PLANNED_COST if planned else 1))
-        self._hurry = hurry
 
-    @property
-    def spent(self) -> bool:
-        """Whether no further counterfactual should be evaluated."""
-        return self._left <= 0 or self._hurry()
-
-    def insert(
-        self,
-        i: int,
-        place: int,
-        j: int,
-        more_load: Floats | None = None,
-        more_range: float = 0.0,
-        deadline: float | None = None,
-        more_steps: int = 0,
-    ) -> Outcome:
-        """Fly the plan with target `j` as visit `place` of UAV `i`, in an easier problem if so asked."""
-        self._left -= 1
-        arrays = self._arrays
-        kept = arrays.load[0, i].copy(), arrays.voyage[0, i], arrays.deadline[0, j]
-        if more_load is not None:
-            arrays.load[0, i] += more_load
-        arrays.voyage[0, i] += more_range
-        if deadline is not None:
-            arrays.deadline[0, j] = deadline
-        arrays.max_steps[0] += more_steps
-        route = self._routes[i].copy()
-        self._routes[i, place + 1 :] = route[place:-1]
-        self._routes[i, place] = j
-        self._length[i] += 1
-        outcome = self._fly(j)
-        self._length[i] -= 1
-        self._routes[i] = route
-        arrays.max_steps[0] -= more_steps
-        arrays.load[0, i], arrays.voyage[0, i], arrays.deadline[0, j] = kept
+    def visit(self, i: int, place: int, j: int, relaxation: Relaxation | None = None) -> Outcome:
+        """Fly the plan with target `j` as visit `place` of UAV `i`, or NO_VISIT, in an easier problem."""
+        given, arrays = self._given, self._arrays
+        reloaded = relaxation is not None and any(relaxation.more_load)
+        if relaxation is not None:
+            arrays.load[0, i] += relaxation.more_load
+            arrays.voyage[0, i] += relaxation.more_range
+            arrays.max_steps[0] += relaxation.more_steps
+            for later in relaxation.later_deadlines:
+                arrays.deadline[0, self._index[later.target_id]] += later.by
+        outcome = self._fly(i, place, j, reloaded)
+        if relaxation is not None:
+            arrays.load[0, i] = given.load[0, i]
+            arrays.voyage[0, i] = given.voyage[0, i]
+            arrays.max_steps[0] = given.max_steps[0]
+            for later in relaxation.later_deadlines:
+                x = self._index[later.target_id]
+                arrays.deadline[0, x] = given.deadline[0, x]
         return outcome
 
-    def _fly(self, j: int) -> Outcome:
-        arrays, episodes = self._arrays, self._episodes
-        _fly_routes(arrays, episodes, self._routes, self._length, self._planned, self._cursor, self._actions)
-        satisfaction, lacking = float(episodes.satisfaction[0]), float(episodes.need[0, j].sum())
-        if self._planned:
-            delivered = best_deliveries(arrays, self._actions[: int(arrays.max_steps[0])])
-            there = np.where(
-                self._actions[: len(delivered)] < arrays.shape[1], self._actions[: len(delivered)], 0
-            )
-            per_unit = arrays.level[0] / np.where(arrays.need_total[0] > 0, arrays.need_total[0], 1.0)
-            satisfaction = float((delivered.sum(axis=2) * per_unit[there]).sum())
-            lacking = float(arrays.need_total[0, j] - delivered[self._actions[: len(delivered)] == j].sum())
-        reward = satisfaction - float(arrays.weight[0] * episodes.distance[0])
-        whole = float(arrays.need_total[0, j])
-        elsewhere = satisfaction - float(arrays.level[0, j]) * (whole - lacking) / whole
-        return Outcome(reward, elsewhere, bool(lacking < self._remaining[j] * (1 - 1e-9)))
+    def _fly(self, i: int, place: int, j: int, reloaded: bool) -> Outcome:
+        arrays, plan, tally = self._arrays, self._plan, self._trial.trial.tally
+        if not self._planned:
+            gain = float(gain_of_visit(arrays, plan, self._trial.trial, i, place, j, reloaded))
+            made = place == NO_VISIT or bool(tally[MADE])
+            return Outcome(gain, made and bool(gets_more(plan, self._trial.trial, j)))
+        gain = float(gain_of_planned_visit(arrays, plan, self._trial, i, place, j, True))
+        if place != NO_VISIT and not tally[MADE]:
+            return Outcome(gain, False)
+        return Outcome(gain, bool(self._trial.known[SOME_KEPT, MORE]))
 
 
-@simulator.compiled
-def _fly_routes(
-    arrays: ProblemArrays,
-    episodes: simulator.Episodes,
-    routes: Integers,
-    length: Integers,
-    planned: bool,
-    cursor: Integers,
-    actions: Integers,
-) -> None:
-    """Fly routes, leaving out what is not allowed, and write the joint actions."""
-    m, home = routes.shape[0], arrays.level.shape[1]
-    simulator.reset_one(arrays, episodes, 0)
-    for i in range(m):
-        cursor[i] = 0
-    for s in range(actions.shape[0]):
-        for i in range(m):
-            actions[s, i] = home
-            while s < arrays.max_steps[0] and cursor[i] < length[i]:
-                j = routes[i, cursor[i]]
-                cursor[i] += 1
-                if planned:
-                    rule = simulator.reach_verdict(arrays, episodes, 0, i, j)
-                    if episodes.ret[0, i]:
-                        rule = simulator.RETURNING
-                else:
-                    rule = simulator.verdict(arrays, episodes, 0, i, j)
-                if rule == simulator.ALLOWED:
-                    actions[s, i] = j
-                    if planned:
-                        simulator.fly_to(arrays, episodes, 0, i, j)
-                    else:
-                        simulator.act(arrays, episodes, 0, i, j)
-                    break
-    for i in range(m):
-        simulator.act(arrays, episodes, 0, i, home)
+def relaxation_for(
+    problem: Problem,
+    more_load: np.ndarray | None = None,
+    more_range: float = 0.0,
+    more_steps: int = 0,
+    late: dict[int, float] | None = None,
+) -> Relaxation:
+    """Make a relaxation with figures of six digits, rounded up, so that they suffice as they are printed."""
+    load = (0.0,) * problem.n_materials if more_load is None else tuple(rounded_up(x) for x in more_load)
+    return Relaxation(
+        load,
+        rounded_up(more_range),
+        more_steps,
+        tuple(LaterDeadline(problem.targets[x].id, rounded_up(by)) for x, by in (late or {}).items()),
+    )
+
+
+def rounded_up(amount: float) -> float:
+    """The least number of six digits that is not below an amount, apart from the rounding of the amount."""
+    amount = float(amount)
+    if not amount > 0.0:
+        return 0.0
+    nearest = float(f"{amount:.6g}")
+    return nearest if nearest >= amount * (1 - 1e-12) else float(_DIGITS.create_decimal(Decimal(amount)))

@@ -1,32 +1,42 @@
 """What an area with needs left could still get: who could come, and where one more visit fits into a plan.
 
-Facts only; :mod:`app.simulation.unmet` says what follows from them.
+Facts only; :mod:`app.simulation.unmet` says what follows from them. Every place in the route of every UAV is
+looked at, and what a visit there does is exact, not guessed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.flown_plan import FlownPlan
+from app.simulation.insertion import MADE, WORK, begin, gain_of_visit, need_at, take_up
+from app.simulation.planned_insertion import PlannedTrial, gain_of_planned_visit, look_at_all_kept
 
-_LOOKS = 3_000_000
-"""Places for one more visit that are looked at: tens of milliseconds. Beyond, only ends of routes."""
+_WORK = 3_000_000
+"""Visits flown for all areas of an answer: some tenths of a second. Beyond, no more are looked at."""
 
-_PIECE = 300_000
+_PIECE = 40_000
 """Of them, between two looks at the clock."""
 
+NONE = -1
+"""In place of a UAV: there is none."""
 
-NONE, NOT_LOOKED = -1, -2
-"""In place of a UAV: there is none; there was no time to look for one."""
+STEP, RANGE, TIME = 1, 2, 4
+"""What a visit lacks, as a sum, where the UAV keeps all the others of its route."""
+
+AS_IS = 8
+"""Place in :class:`Places`, after those for every sum of what is lacking, of the best visit that is legal."""
+
+_COMERS, _IN_RANGE, _IN_TIME = range(3)
 
 
-class Facts(NamedTuple):
-    """About each target, from where the request has the swarm; UAVs are NONE where there is none.
+class Start(NamedTuple):
+    """Who could come to each target from where the request has the swarm; NONE where there is nobody.
 
     Attributes
     ----------
@@ -34,208 +44,323 @@ class Facts(NamedTuple):
         (N,) the UAV that carries something needed and lacks least range, and how much it lacks.
     fastest, late
         (N,) the UAV among those with the range that arrives first, and how long after the deadline.
-    uav, place, guess, short
-        (N,) the best place for one more visit: UAV (NOT_LOOKED if nobody looked), number of the visit,
-        guessed change of the reward, and the range that the UAV lacks to keep the rest of its route.
     """
 
     carrier: Integers
     missing: Floats
     fastest: Integers
     late: Floats
-    uav: Integers
-    place: Integers
-    guess: Floats
-    short: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class FlownPlan:
-    """A plan as one more visit meets it.
+class Places(NamedTuple):
+    """The best places for one more visit to a target; UAVs are NONE where there is none.
 
     Attributes
     ----------
-    target, length
-        (M, S) and (M,) its routes.
-    delivered
-        (S, M, K) what its visits unload.
-    reward
-        What it earns.
-    episodes
-        One episode at its end, every UAV still at its last stop.
+    uav, place, gain
+        (9,) visits with something that is left over in the plan, by what they lack, each with the change of
+        the reward once that is there: 0 where they lack nothing. The last one is the best of all visits that
+        are legal in the plan, whatever they take from others.
+    loader, loader_place, hope
+        (4,) UAVs that could come with more aboard, by how many things they lack beside, where in their
+        routes, and what that would earn at most.
+    left_over
+        (1,) whether any UAV that could come has something useful left over.
     """
 
-    target: Integers
-    length: Integers
-    delivered: Floats
-    reward: float
-    episodes: simulator.Episodes
+    uav: Integers
+    place: Integers
+    gain: Floats
+    loader: Integers
+    loader_place: Integers
+    hope: Floats
+    left_over: Integers
 
 
-def gather(arrays: ProblemArrays, plan: FlownPlan, urgent: Integers, hurry: Callable[[], bool]) -> Facts:
-    """Look at the swarm and the plan from every target that is listed.
+def look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers) -> Start:
+    """Look at the swarm from some targets."""
+    n = arrays.shape[1]
+    start = Start(
+        np.full(n, NONE, np.int64), np.full(n, np.inf), np.full(n, NONE, np.int64), np.full(n, np.inf)
+    )
+    # What is found does not depend on the order; neighbours in memory are quicker one after the other.
+    _look_from_start(arrays, plan, np.sort(targets), start)
+    return start
+
+
+class Lookout:
+    """Looks at every place for one more visit, for one target after the other, as long as there is time.
 
     Parameters
     ----------
     arrays
         A stack of one problem.
-    plan
-        A legal plan.
-    urgent
-        Targets with needs left, most urgent first.
+    plan, trial
+        Its plan, and scratch space for it.
+    planned
+        Whether unloading is planned.
     hurry
-        Once it is true, no more places are looked at.
+        Once it is true, no more is looked at.
     """
-    m, n, _ = arrays.shape
-    facts = Facts(
-        np.full(n, NONE, np.int64), np.full(n, np.inf), np.full(n, NONE, np.int64), np.full(n, np.inf),
-        np.full(n, NOT_LOOKED, np.int64), np.zeros(n, np.int64), np.full(n, -np.inf), np.zeros(n),
-    )  # fmt: skip
-    # What is found does not depend on the order; neighbours in memory are quicker one after the other.
-    _look_from_start(arrays, plan.episodes, np.sort(urgent), facts)
-    steps = plan.target.shape[1]
-    # Just before each visit: distance flown, time, what is carried; and what is earned from there on.
-    flown, clock = np.zeros((m, steps + 1)), np.zeros((m, steps + 1))
-    load, later = np.zeros((m, steps + 1, arrays.shape[2])), np.zeros((m, steps + 1))
-    _walk(arrays, plan.target, plan.length, plan.delivered, flown, clock, load, later)
-    places = int(plan.length.sum()) + m
-    thorough, done = min(len(urgent), _LOOKS // places), 0
-    while done < len(urgent) and not hurry():
-        everywhere = done < thorough
-        piece = max(1, _PIECE // (places if everywhere else m))
-        some = np.sort(urgent[done : min(done + piece, thorough if everywhere else len(urgent))])
-        _look_for_place(
-            arrays,
-            plan.episodes,
-            plan.target,
-            plan.length,
-            flown,
-            clock,
-            load,
-            later,
-            some,
-            everywhere,
-            facts,
+
+    def __init__(
+        self,
+        arrays: ProblemArrays,
+        plan: FlownPlan,
+        trial: PlannedTrial,
+        planned: bool,
+        hurry: Callable[[], bool],
+    ) -> None:
+        self._arrays, self._plan, self._trial, self._planned = arrays, plan, trial, planned
+        self._hurry = hurry
+        self._easy = arrays._replace(
+            voyage=np.full_like(arrays.voyage, np.inf),
+            deadline=np.full_like(arrays.deadline, np.inf),
+            max_steps=arrays.max_steps + 1,
         )
-        facts.uav[some] = np.maximum(facts.uav[some], NONE)
-        done += len(some)
-    return facts
+        self._lacking = np.zeros(plan.leg.shape[1] + 3)
+
+    @property
+    def spent(self) -> bool:
+        """Whether this answer has had its share of looking, however much time there is."""
+        return int(self._trial.trial.tally[WORK]) >= _WORK
+
+    def look(self, j: int, start: Start) -> Places | None:
+        """Look at all places for a visit to target `j`; None if that cannot be finished."""
+        comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
+        if comers == _IN_RANGE and not is_late(float(start.late[j]), float(self._arrays.deadline[0, j])):
+            comers = _IN_TIME
+        found = Places(
+            np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
+            np.full(4, NONE, np.int64), np.zeros(4, np.int64), np.full(4, -np.inf), np.zeros(1, np.int64),
+        )  # fmt: skip
+        i = 0
+        while i < self._arrays.shape[0]:
+            if self.spent or self._hurry():
+                return None
+            i = _look(
+                self._arrays, self._easy, self._plan, self._trial, self._planned, j, comers, i,
+                self._lacking, found,
+            )  # fmt: skip
+        return found
+
+    def lacking(self, i: int, place: int, j: int) -> tuple[bool, float, dict[int, float]]:
+        """What UAV `i` lacks for target `j` as visit `place`, if it keeps all others.
+
+        Returns
+        -------
+        tuple
+            Whether a decision step; range; and for the targets that it would reach too late, how much.
+        """
+        lacks = lacking(self._arrays, self._plan, i, place, j, self._lacking)
+        late: dict[int, float] = {}
+        if lacks & TIME:
+            route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
+            for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
+                if is_late(after, float(self._arrays.deadline[0, x])):
+                    late[x] = max(after, late.get(x, 0.0))
+        return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
 
 
 @simulator.compiled
-def _look_from_start(
-    arrays: ProblemArrays, episodes: simulator.Episodes, urgent: Integers, facts: Facts
-) -> None:
+def is_late(after: float, deadline: float) -> bool:
+    """Whether an arrival that is so long after a deadline is too late."""
+    return after > abs(deadline) * simulator.TOLERANCE
+
+
+@simulator.compiled
+def _carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
+    """Whether a UAV can be sent and carries, at first, something that a target still needs at the end."""
+    if arrays.ret[0, i]:
+        return False
+    for k in range(plan.remaining.shape[1]):
+        if arrays.load[0, i, k] > 0.0 and plan.remaining[j, k] > 0.0:
+            return True
+    return False
+
+
+@simulator.compiled
+def _missing(arrays: ProblemArrays, i: int, j: int) -> float:
+    """Range that a UAV lacks to fly to a target directly; negative where it has more than that."""
+    reach: float = arrays.dis[0, i] + arrays.start_target[0, i, j]
+    if arrays.return_to_base[0]:
+        reach += arrays.home[0, i, j]
+    missing: float = reach - arrays.voyage[0, i]
+    return missing
+
+
+@simulator.compiled
+def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, start: Start) -> None:
     """Who carries what a target needs, who of them has the range, and who of those is there first."""
     for i in range(arrays.speed.shape[1]):
-        if arrays.ret[0, i]:
-            continue
-        for q in range(urgent.shape[0]):
-            j = urgent[q]
-            useful = False
-            for k in range(arrays.load.shape[2]):
-                useful = useful or (arrays.load[0, i, k] > 0.0 and episodes.need[0, j, k] > 0.0)
-            if not useful:
+        for q in range(targets.shape[0]):
+            j = targets[q]
+            if not _carries(arrays, plan, i, j):
                 continue
-            reach = arrays.dis[0, i] + arrays.start_target[0, i, j]
-            if arrays.return_to_base[0]:
-                reach += arrays.home[0, i, j]
-            missing = reach - arrays.voyage[0, i]
-            if missing < facts.missing[j]:
-                facts.missing[j], facts.carrier[j] = missing, i
-            if reach <= arrays.voyage[0, i] * (1.0 + simulator.TOLERANCE):
+            missing = _missing(arrays, i, j)
+            if missing < start.missing[j]:
+                start.missing[j], start.carrier[j] = missing, i
+            if missing <= arrays.voyage[0, i] * simulator.TOLERANCE:
                 late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
-                if facts.fastest[j] < 0 or late < facts.late[j]:
-                    facts.late[j], facts.fastest[j] = late, i
+                if start.fastest[j] < 0 or late < start.late[j]:
+                    start.late[j], start.fastest[j] = late, i
 
 
 @simulator.compiled
-def _walk(
-    arrays: ProblemArrays,
-    target: Integers,
-    length: Integers,
-    delivered: Floats,
-    flown: Floats,
-    clock: Floats,
-    load: Floats,
-    later: Floats,
-) -> None:
-    """Write down distance, time and load before each visit, and what is earned from there on."""
-    materials = load.shape[2]
-    for i in range(target.shape[0]):
-        flown[i, 0] = arrays.dis[0, i]
-        for k in range(materials):
-            load[i, 0, k] = arrays.load[0, i, k]
-        for s in range(length[i]):
-            j = target[i, s]
-            leg = arrays.start_target[0, i, j] if s == 0 else arrays.between[0, target[i, s - 1], j]
-            flown[i, s + 1] = flown[i, s] + leg
-            clock[i, s + 1] = clock[i, s] + leg / arrays.speed[0, i] + arrays.service[0, j]
-            for k in range(materials):
-                load[i, s + 1, k] = max(0.0, load[i, s, k] - delivered[s, i, k])
-        for s in range(length[i] - 1, -1, -1):
-            j = target[i, s]
-            later[i, s] = later[i, s + 1]
-            for k in range(materials):
-                if delivered[s, i, k] > 0.0:
-                    later[i, s] += arrays.level[0, j] * delivered[s, i, k] / arrays.need_total[0, j]
+def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) -> bool:
+    """Whether a UAV counts among those that could come: carriers, those in range, or those in time too."""
+    if not _carries(arrays, plan, i, j):
+        return False
+    if comers >= _IN_RANGE and _missing(arrays, i, j) > arrays.voyage[0, i] * simulator.TOLERANCE:
+        return False
+    late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
+    return not (comers >= _IN_TIME and is_late(late, arrays.deadline[0, j]))
 
 
 @simulator.compiled
-def _look_for_place(
+def _look(
     arrays: ProblemArrays,
-    episodes: simulator.Episodes,
-    target: Integers,
-    length: Integers,
-    flown: Floats,
-    clock: Floats,
-    load: Floats,
-    later: Floats,
-    urgent: Integers,
-    everywhere: bool,
-    facts: Facts,
-) -> None:
-    """Guess the best place for one more visit to each target: among all, or the ends of routes."""
-    for i in range(target.shape[0]):
+    easy: ProblemArrays,
+    plan: FlownPlan,
+    trial: PlannedTrial,
+    planned: bool,
+    j: int,
+    comers: int,
+    first: int,
+    lacks: Floats,
+    found: Places,
+) -> int:
+    """Look at the routes of UAVs from `first` on, for a while; return the UAV to go on with."""
+    tally = trial.trial.tally
+    end = tally[WORK] + _PIECE
+    for i in range(first, plan.back.shape[0]):
+        if tally[WORK] > end:
+            return i
         if arrays.ret[0, i]:
             continue
-        end = length[i]
-        for q in range(urgent.shape[0]):
-            j = urgent[q]
-            for place in range(0 if everywhere else end, end + 1):
-                if place == 0:
-                    there = arrays.start_target[0, i, j]
-                else:
-                    there = arrays.between[0, target[i, place - 1], j]
-                reach = flown[i, place] + there
-                if arrays.return_to_base[0]:
-                    reach += arrays.home[0, i, j]
-                latest = arrays.deadline[0, j]
-                arrival = clock[i, place] + there / arrays.speed[0, i]
-                if reach > arrays.voyage[0, i] * (1.0 + simulator.TOLERANCE) or arrival > latest + abs(
-                    latest
-                ) * (simulator.TOLERANCE):
-                    continue
-                unloaded, spare = 0.0, 0.0
-                for k in range(load.shape[2]):
-                    unloaded += min(load[i, place, k], episodes.need[0, j, k])
-                    spare += min(load[i, end, k], episodes.need[0, j, k])
-                if unloaded <= 0.0:
-                    continue
-                detour, short = there, 0.0
-                if place < end:
-                    following = target[i, place]
-                    detour += arrays.between[0, j, following] - (flown[i, place + 1] - flown[i, place])
-                    last = flown[i, end] + detour
-                    if arrays.return_to_base[0]:
-                        last += arrays.home[0, i, target[i, end - 1]]
-                    if last > arrays.voyage[0, i] * (1.0 + simulator.TOLERANCE):
-                        short = last - arrays.voyage[0, i]
-                # What is taken from later visits is guessed to be worth there what it is on average.
-                lost = later[i, place] if short > 0.0 else later[i, place] * (1.0 - spare / unloaded)
-                guess = (
-                    arrays.level[0, j] * unloaded / arrays.need_total[0, j] - lost - arrays.weight[0] * detour
-                )
-                if facts.uav[j] < 0 or guess > facts.guess[j]:
-                    facts.uav[j], facts.place[j] = i, place
-                    facts.guess[j], facts.short[j] = guess, short
+        left_over = False
+        if _comes(arrays, plan, i, j, comers):
+            for k in range(plan.spare.shape[1]):
+                left_over = left_over or (plan.spare[i, k] > 0.0 and plan.remaining[j, k] > 0.0)
+            if planned and not left_over:
+                left_over = look_at_all_kept(arrays, plan, trial, i, j)
+        if left_over:
+            found.left_over[0] = 1
+        for place in range(plan.visits.length[i] + 1):
+            tally[WORK] += 1
+            lack = lacking(arrays, plan, i, place, j, lacks)
+            _note_loader(arrays, plan, i, place, j, lack, found)
+            gain = _gain(arrays, plan, trial, planned, i, place, j)
+            if tally[MADE] == 1:
+                _note(found, AS_IS, i, place, gain)
+                if left_over and lack == 0:
+                    _note(found, 0, i, place, gain)
+            if left_over and lack != 0:
+                gain = _gain(easy, plan, trial, planned, i, place, j)
+                if tally[MADE] == 1:
+                    _note(found, lack, i, place, gain)
+    return int(plan.back.shape[0])
+
+
+@simulator.compiled
+def _gain(
+    arrays: ProblemArrays, plan: FlownPlan, trial: PlannedTrial, planned: bool, i: int, place: int, j: int
+) -> float:
+    """Change of the reward with a visit; ``tally[MADE]`` says whether it is legal."""
+    if planned:
+        return gain_of_planned_visit(arrays, plan, trial, i, place, j, False)
+    greedy = trial.trial
+    begin(greedy, i, place, j)
+    if place >= arrays.max_steps[0]:
+        return 0.0
+    take_up(plan, greedy, i, place)
+    need_at(plan, greedy, j, place * plan.back.shape[0] + i)
+    if simulator.verdict(arrays, greedy.episodes, 0, i, j) != simulator.ALLOWED:
+        return 0.0
+    return gain_of_visit(arrays, plan, greedy, i, place, j, False)
+
+
+@simulator.compiled
+def _note(found: Places, which: int, i: int, place: int, gain: float) -> None:
+    """Keep a visit if it is the best of its kind."""
+    if found.uav[which] < 0 or gain > found.gain[which]:
+        found.uav[which], found.place[which], found.gain[which] = i, place, gain
+
+
+@simulator.compiled
+def _note_loader(
+    arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, lack: int, found: Places
+) -> None:
+    """Keep a visit with more aboard if it could earn most of those that lack as many things beside."""
+    number = (lack & STEP) // STEP + (lack & RANGE) // RANGE + (lack & TIME) // TIME
+    still = 0.0
+    for k in range(plan.remaining.shape[1]):
+        still += plan.remaining[j, k]
+    hope = arrays.level[0, j] * still / arrays.need_total[0, j]
+    hope -= arrays.weight[0] * _detour(arrays, plan, i, place, j)
+    if hope > found.hope[number]:
+        found.loader[number], found.loader_place[number], found.hope[number] = i, place, hope
+
+
+@simulator.compiled
+def _leg(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
+    """Distance to a target from where a UAV is before its visit `place`."""
+    at = simulator.START if place == 0 else plan.visits.target[i, place - 1]
+    leg: float = arrays.start_target[0, i, j] if at == simulator.START else arrays.between[0, at, j]
+    return leg
+
+
+@simulator.compiled
+def _detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
+    """Distance to a target and on to the next one, more than there directly."""
+    detour = _leg(arrays, plan, i, place, j)
+    if place < plan.visits.length[i]:
+        detour += arrays.between[0, j, plan.visits.target[i, place]] - plan.leg[i, place]
+    elif arrays.charge_return[0]:
+        detour += arrays.home[0, i, j] - plan.back[i]
+    return detour
+
+
+@simulator.compiled
+def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, lacks: Floats) -> int:
+    """What a UAV lacks for one more visit, if it keeps all others.
+
+    Parameters
+    ----------
+    arrays, plan
+        The problem and its plan.
+    i, place, j
+        The visit.
+    lacks
+        Filled: 1 where a step is missing, range, and how long after the deadlines it and all later visits
+        arrive.
+
+    Returns
+    -------
+    int
+        The sum of what is lacking, beyond the tolerance.
+    """
+    length, speed, voyage = plan.visits.length[i], arrays.speed[0, i], arrays.voyage[0, i]
+    there, detour = _leg(arrays, plan, i, place, j), _detour(arrays, plan, i, place, j)
+    lack = 0
+    lacks[0] = 0.0
+    if length >= arrays.max_steps[0]:
+        lacks[0], lack = 1.0, STEP
+    reach = plan.flown[i, place] + there
+    if arrays.return_to_base[0]:
+        reach += arrays.home[0, i, j]
+    lacks[1] = reach - voyage
+    lacks[2] = plan.clock[i, place] + there / speed - arrays.deadline[0, j]
+    late = is_late(lacks[2], arrays.deadline[0, j])
+    for s in range(place, length):
+        x = plan.visits.target[i, s]
+        reach = plan.flown[i, s + 1] + detour
+        if arrays.return_to_base[0]:
+            reach += arrays.home[0, i, x]
+        lacks[1] = max(lacks[1], reach - voyage)
+        arrival = plan.clock[i, s] + (plan.leg[i, s] + detour) / speed + arrays.service[0, j]
+        lacks[3 + s - place] = arrival - arrays.deadline[0, x]
+        late = late or is_late(lacks[3 + s - place], arrays.deadline[0, x])
+    if lacks[1] > voyage * simulator.TOLERANCE:
+        lack += RANGE
+    return lack + TIME if late else lack

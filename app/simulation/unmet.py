@@ -1,41 +1,48 @@
 """Why a rescue area does not get all it needs: a code, a sentence with numbers, and what would change it.
 
 The reasons are tried from the hardest to the softest: what no plan could do from where the request has the
-swarm, then what one more visit would do to this plan. Each is verified by flying the plan with that visit on
-the simulator, first in the problem as it is, then with more load, range, time or steps. The most urgent areas
-are first; where an answer has too many for all to be flown, the rest say that they were not.
+swarm, then what one more visit would do to this plan. For the latter every visit of every UAV at every place
+of its route is evaluated, in the problem as it is and, where the UAV has something useful left over, with
+the range, time or steps that it lacks. The most urgent areas are first; where an answer has too many for all
+to be looked at, the rest say that they were not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from app.domain.allocation import Unmet
+from app.domain.allocation import Relaxation, Unmet, UnmetCode
 from app.domain.problem import Problem
-from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.counterfactual import Counterfactuals, Outcome
-from app.simulation.openings import NONE, NOT_LOOKED, Facts, FlownPlan, gather
+from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
+from app.simulation.flown_plan import FlownPlan, record_plan
+from app.simulation.openings import (
+    AS_IS,
+    NONE,
+    RANGE,
+    STEP,
+    TIME,
+    Lookout,
+    Places,
+    Start,
+    is_late,
+    look_from_start,
+)
+from app.simulation.planned_insertion import new_planned_trial
+from app.simulation.unmet_wording import Wording
 
-NO_SUPPLY = "no_supply"
-OUT_OF_RANGE = "out_of_range"
-DEADLINE = "deadline"
-LOADS_USED = "loads_used"
-RANGE_USED = "range_used"
-NOT_WORTH_IT = "not_worth_it"
-STEP_LIMIT = "step_limit"
-NOT_CHOSEN = "not_chosen"
+_RELAXED = (STEP, RANGE, TIME, STEP + RANGE, STEP + TIME, RANGE + TIME, STEP + RANGE + TIME)
+"""What a visit may lack, fewest things first."""
 
 
 def unmet_targets(
     problem: Problem,
     arrays: ProblemArrays,
-    episodes: simulator.Episodes,
     actions: Integers,
     delivered: Floats,
-    reward: float,
     hurry: Callable[[], bool],
 ) -> tuple[Unmet, ...]:
     """List the targets with needs left at the end of a plan.
@@ -44,33 +51,35 @@ def unmet_targets(
     ----------
     problem, arrays
         The problem, and the same as a stack of one.
-    episodes
-        One episode at the plan's end, every UAV still at its last stop.
     actions, delivered
         (S', M) joint actions and (S', M, K) what they unload.
-    reward
-        What the plan earns.
     hurry
-        Once it is true, nothing more is looked for or flown.
+        Once it is true, nothing more is looked at.
     """
-    m, n, _ = arrays.shape
-    visiting = actions < n
-    length = visiting.sum(axis=0)
-    target = np.zeros((m, int(arrays.max_steps[0])), np.int64)
-    target[:, : len(actions)] = np.where(visiting, actions, 0).T
-    plan = FlownPlan(target, length, delivered, reward, episodes)
-    remaining = episodes.need[0]
-    open_targets = np.flatnonzero(remaining.max(axis=1) > 0)
+    planned = problem.objective.unloading == "planned"
+    plan = record_plan(arrays, actions, delivered, planned)
+    open_targets = np.flatnonzero(plan.remaining.max(axis=1) > 0)
     if not len(open_targets):
         return ()
-    share = remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
+    share = plan.remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
     urgent = open_targets[np.argsort(-arrays.level[0, open_targets] * share, kind="stable")]
-    facts = gather(arrays, plan, urgent, hurry)
-    planned = problem.objective.unloading == "planned"
-    counterfactuals = Counterfactuals(arrays, target, length, planned, remaining.sum(axis=1), hurry)
-    judge = _Judge(problem, arrays, plan, facts, counterfactuals)
+    trial = new_planned_trial(arrays, plan, actions, planned)
+    start = look_from_start(arrays, plan, open_targets)
+    lookout = Lookout(arrays, plan, trial, planned, hurry)
+    judge = _Judge(
+        problem, arrays, plan, start, lookout, Counterfactuals(problem, arrays, plan, trial, planned)
+    )
     found = {int(j): judge.reason(int(j)) for j in urgent}
     return tuple(found[int(j)] for j in open_targets)
+
+
+class _Remedy(NamedTuple):
+    """A visit, and what has to be allowed for it; `new` is false where the plan has the visit already."""
+
+    uav: int
+    place: int
+    relaxation: Relaxation | None = None
+    new: bool = True
 
 
 class _Judge:
@@ -81,134 +90,159 @@ class _Judge:
         problem: Problem,
         arrays: ProblemArrays,
         plan: FlownPlan,
-        facts: Facts,
+        start: Start,
+        lookout: Lookout,
         counterfactuals: Counterfactuals,
     ) -> None:
-        self._problem, self._arrays, self._plan = problem, arrays, plan
-        self._facts, self._fly = facts, counterfactuals
-        self._least = 1e-9 * max(1.0, abs(plan.reward))
+        self._problem, self._arrays, self._plan, self._start = problem, arrays, plan, start
+        self._lookout, self._counterfactuals = lookout, counterfactuals
+        self._says = Wording(problem, plan)
 
     def reason(self, j: int) -> Unmet:
         """Say why target `j` does not get all it needs."""
-        facts, problem = self._facts, self._problem
-        carrier, fastest = int(facts.carrier[j]), int(facts.fastest[j])
-        if carrier < 0:
-            return self._no_supply(j)
-        if fastest < 0:
-            lacks = float(facts.missing[j])
-            says = f"no UAV that carries what it needs has the range: the best lacks {lacks:.6g}"
-            remedy = f"range +{lacks:.6g} of {problem.uavs[carrier].id}"
-            outcome = (
-                None if self._fly.spent else self._fly.insert(carrier, 0, j, more_range=lacks * (1 + 1e-9))
+        carrier, fastest = int(self._start.carrier[j]), int(self._start.fastest[j])
+        places = self._lookout.look(j, self._start)
+        if carrier == NONE:
+            return self._hard(j, UnmetCode.NO_SUPPLY, self._says.no_supply(), None, places)
+        if fastest == NONE:
+            missing = float(self._start.missing[j])
+            least = _Remedy(carrier, 0, relaxation_for(self._problem, more_range=missing))
+            return self._hard(
+                j, UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least, places
             )
-            return self._unmet(j, OUT_OF_RANGE, says, carrier, remedy, outcome)
-        late = float(facts.late[j])
-        latest = float(self._arrays.deadline[0, j])
-        if late > abs(latest) * simulator.TOLERANCE:
-            says = f"the fastest UAV that could serve it would arrive {late:.6g} after its deadline"
-            remedy = f"a deadline {late:.6g} later"
-            outcome = None if self._fly.spent else self._fly.insert(fastest, 0, j, deadline=latest + late)
-            return self._unmet(j, DEADLINE, says, fastest, remedy, outcome)
-        return self._one_more_visit(j)
+        late = float(self._start.late[j])
+        if is_late(late, float(self._arrays.deadline[0, j])):
+            least = _Remedy(fastest, 0, relaxation_for(self._problem, late={j: late}))
+            return self._hard(j, UnmetCode.DEADLINE, self._says.deadline(fastest, late), least, places)
+        if places is None:
+            says = self._says.not_looked(fastest, self._lookout.spent)
+            return self._unmet(j, UnmetCode.NOT_CHOSEN, says, uav=fastest, verified=False)
+        return self._of_this_plan(j, places)
 
-    def _no_supply(self, j: int) -> Unmet:
-        says = "no UAV that can be sent carries any of the materials still needed"
-        ready = np.flatnonzero(~self._arrays.ret[0])
-        if not len(ready):
-            return self._unmet(j, NO_SUPPLY, says, -1, "a UAV that is not returning", None)
-        nearest = int(ready[np.argmin(self._arrays.start_target[0, ready, j])])
-        outcome = None
-        if not self._fly.spent:
-            place = int(self._plan.length[nearest])
-            outcome = self._fly.insert(
-                nearest, place, j, more_load=self._plan.episodes.need[0, j], more_steps=1
-            )
-            if not outcome.helps:
-                outcome = self._fly.insert(nearest, 0, j, more_load=self._plan.episodes.need[0, j])
-        remedy = f"{self._amounts(j)} aboard {self._problem.uavs[nearest].id}"
-        return self._unmet(j, NO_SUPPLY, says, nearest, remedy, outcome)
+    def _hard(
+        self, j: int, code: UnmetCode, says: str, least: _Remedy | None, places: Places | None
+    ) -> Unmet:
+        """A reason that no plan could change; what a remedy earns is looked at only where there is time."""
+        uav = None if least is None else least.uav
+        if places is None:
+            return self._unmet(j, code, says, uav=uav)
+        remedies = [
+            *([] if least is None else [least]),
+            *self._relaxed(j, places),
+            *self._reloaded(j, places),
+        ]
+        helping = []
+        for remedy in remedies:
+            outcome = self._fly(j, remedy)
+            if outcome.helps and outcome.gain > 0:
+                return self._unmet(j, code, says, remedy, outcome)
+            if outcome.helps:
+                helping.append((remedy, outcome))
+        if helping:
+            remedy, outcome = helping[0]
+            return self._unmet(j, code, says + self._says.even_then(outcome.gain), remedy, outcome)
+        return self._unmet(j, code, says, uav=uav)
 
-    def _one_more_visit(self, j: int) -> Unmet:
-        facts = self._facts
-        i, place = int(facts.uav[j]), int(facts.place[j])
-        if i == NOT_LOOKED:
-            says = "a UAV with what it needs could be there in range; no time was left to look further"
-            return self._unmet(j, NOT_CHOSEN, says, int(facts.fastest[j]), None, None)
-        if i == NONE:
-            says = "the UAVs that could serve it have used their loads, range or time elsewhere"
-            return self._unmet(j, LOADS_USED, says, -1, None, None)
-        uav = self._problem.uavs[i].id
-        if self._fly.spent:
-            guess = float(facts.guess[j])
-            code = NOT_CHOSEN if guess > 0 else LOADS_USED
-            says = f"one more visit, by {uav}, is guessed to change the reward by {guess:.6g}"
-            return self._unmet(j, code, says, i, None, None)
-        where = "first" if place == 0 else f"after {self._id(int(self._plan.target[i, place - 1]))}"
-        now = self._fly.insert(i, place, j)
-        gain = now.reward - self._plan.reward
-        if gain > self._least:
-            says = f"one more visit would earn {gain:.6g}; a better algorithm or more time finds it"
-            return self._unmet(j, NOT_CHOSEN, says, i, f"{uav} flies there {where}", now)
-        full = int(self._plan.length[i]) >= int(self._arrays.max_steps[0])
-        if full:
-            longer = self._fly.insert(i, place, j, more_steps=1)
-            if longer.reward - self._plan.reward > self._least:
-                says = f"one more decision step would earn {longer.reward - self._plan.reward:.6g} here"
-                return self._unmet(j, STEP_LIMIT, says, i, "one more decision step", longer)
-        lacks = float(facts.short[j])
-        if lacks > 0:
-            further = self._fly.insert(i, place, j, more_range=lacks * (1 + 1e-9), more_steps=int(full))
-            if further.reward - self._plan.reward > self._least:
-                says = (
-                    f"{uav} would have to give up other visits for it: it lacks {lacks:.6g} of range for all"
-                )
-                step = " and one more decision step" if full else ""
-                return self._unmet(j, RANGE_USED, says, i, f"range +{lacks:.6g} of {uav}{step}", further)
-        needed = self._plan.episodes.need[0, j]
-        loaded = self._fly.insert(
-            i, place, j, more_load=needed, more_range=max(0.0, lacks) * (1 + 1e-9), more_steps=int(full)
-        )
-        remedy = None
-        if loaded.reward - self._plan.reward > self._least:
-            extras = [f"{self._amounts(j)} more aboard {uav}"]
-            extras += [f"range +{lacks:.6g}"] if lacks > 0 else []
-            extras += ["one more decision step"] if full else []
-            remedy = ", ".join(extras)
-        outcome = now if remedy is None else loaded
-        if now.helps and now.elsewhere >= self._elsewhere(j) - self._least:
-            says = f"one more visit would cost {max(0.0, -gain):.6g} more in distance than it earns"
-            return self._unmet(j, NOT_WORTH_IT, says, i, remedy, outcome)
-        says = "what there is serves as much elsewhere"
-        if gain < 0:
-            says = f"what there is serves more elsewhere: bringing it here would cost {-gain:.6g}"
-        return self._unmet(j, LOADS_USED, says, i, remedy, outcome)
+    def _of_this_plan(self, j: int, places: Places) -> Unmet:
+        """A reason that lies in the other visits of the plan."""
+        best = now = None
+        if places.uav[AS_IS] != NONE:
+            best = _Remedy(int(places.uav[AS_IS]), int(places.place[AS_IS]))
+            now = self._fly(j, best)
+            if now.gain > 0:
+                says = self._says.not_chosen(best.uav, best.place, now.gain)
+                return self._unmet(j, UnmetCode.NOT_CHOSEN, says, best, now)
+        for remedy in self._relaxed(j, places):
+            outcome = self._fly(j, remedy)
+            if outcome.helps and outcome.gain > 0 and remedy.relaxation is not None:
+                code = _code_of(remedy.relaxation)
+                says = self._says.used(remedy.uav, remedy.place, j, remedy.relaxation)
+                return self._unmet(j, code, says, remedy, outcome)
+        code, says = UnmetCode.LOADS_USED, self._says.loads_used(None if now is None else now.gain)
+        uav = None
+        if places.left_over[0]:
+            lack = max((0, *_RELAXED), key=lambda lack: float(places.gain[lack]))
+            uav, place, gain = int(places.uav[lack]), int(places.place[lack]), float(places.gain[lack])
+            code, says = UnmetCode.NOT_WORTH_IT, self._says.not_worth_it(uav, place, gain, lack)
+            best = now = None
+            if lack == 0:
+                best = _Remedy(uav, place)
+                now = self._fly(j, best)
+        for remedy in self._reloaded(j, places):
+            outcome = self._fly(j, remedy)
+            if outcome.helps and outcome.gain > 0:
+                return self._unmet(j, code, says, remedy, outcome)
+        return self._unmet(j, code, says, best, now, uav=uav, stated=False)
 
-    def _elsewhere(self, j: int) -> float:
-        """What the plan earns at other targets than `j`, without distance."""
-        whole = float(self._arrays.need_total[0, j])
-        met = whole - float(self._plan.episodes.need[0, j].sum())
-        return float(self._plan.episodes.satisfaction[0]) - float(self._arrays.level[0, j]) * met / whole
+    def _relaxed(self, j: int, places: Places) -> Iterator[_Remedy]:
+        """Visits with what is left over that gain once range, time or steps are there."""
+        for lack in _RELAXED:
+            i, place = int(places.uav[lack]), int(places.place[lack])
+            if i != NONE and places.gain[lack] > 0:
+                step, more_range, late = self._lookout.lacking(i, place, j)
+                yield _Remedy(i, place, relaxation_for(self._problem, None, more_range, int(step), late))
+
+    def _reloaded(self, j: int, places: Places) -> Iterator[_Remedy]:
+        """Visits of the plan, then additional ones, that bring what is missing with more aboard."""
+        visits, m = self._plan.visits, self._arrays.shape[0]
+        slot = int(visits.first[j])
+        while slot != NONE:
+            i, place = slot % m, slot // m
+            yield _Remedy(i, place, relaxation_for(self._problem, self._more_load(i, place, j)), new=False)
+            slot = int(visits.following[slot])
+        for i, place in zip(places.loader.tolist(), places.loader_place.tolist(), strict=True):
+            if i != NONE:
+                step, more_range, late = self._lookout.lacking(i, place, j)
+                more_load = self._more_load(i, place, j)
+                yield _Remedy(i, place, relaxation_for(self._problem, more_load, more_range, int(step), late))
+
+    def _more_load(self, i: int, place: int, j: int) -> Floats:
+        """What UAV `i` has to carry more for all that is missing, and for what areas before it would take."""
+        missing = self._plan.remaining[j]
+        wanted = missing.copy()
+        for x in {int(x) for x in self._plan.visits.target[i, :place]} - {j}:
+            wanted += np.where(missing > 0, self._plan.remaining[x], 0.0)
+        more: Floats = np.maximum(wanted - self._plan.spare[i], 0.0)
+        return more
+
+    def _fly(self, j: int, remedy: _Remedy) -> Outcome:
+        place = remedy.place if remedy.new else NO_VISIT
+        return self._counterfactuals.visit(remedy.uav, place, j, remedy.relaxation)
 
     def _unmet(
-        self, j: int, code: str, says: str, uav: int, remedy: str | None, outcome: Outcome | None
+        self,
+        j: int,
+        code: UnmetCode,
+        says: str,
+        visit: _Remedy | None = None,
+        outcome: Outcome | None = None,
+        *,
+        uav: int | None = None,
+        stated: bool = True,
+        verified: bool = True,
     ) -> Unmet:
-        change = None if outcome is None else outcome.reward - self._plan.reward
-        hard = code in (NO_SUPPLY, OUT_OF_RANGE, DEADLINE)
-        verified = outcome is not None and (outcome.helps or not hard)
+        """Write a reason down: with the visit that it is about, as a remedy if it is to be stated as one."""
+        remedy = None
+        if visit is not None:
+            uav = visit.uav if uav is None else uav
+            if stated:
+                remedy = self._says.remedy(visit.uav, visit.place, visit.new, visit.relaxation)
         return Unmet(
-            target_id=self._id(j),
-            remaining=tuple(self._plan.episodes.need[0, j].tolist()),
+            target_id=self._problem.targets[j].id,
+            remaining=tuple(self._plan.remaining[j].tolist()),
             code=code,
-            reason=says,
-            uav_id=None if uav < 0 else self._problem.uavs[uav].id,
+            reason=f"{self._says.missing(j)}: {says}",
+            uav_id=None if uav is None else self._problem.uavs[uav].id,
+            step=None if visit is None else visit.place + 1,
             remedy=remedy,
-            reward_change=change if verified else None,
+            relaxation=None if visit is None or not stated else visit.relaxation,
+            reward_change=None if outcome is None else outcome.gain,
             verified=verified,
         )
 
-    def _id(self, j: int) -> str:
-        return self._problem.targets[j].id
 
-    def _amounts(self, j: int) -> str:
-        left = self._plan.episodes.need[0, j]
-        return " and ".join(f"{left[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0))
+def _code_of(relaxation: Relaxation) -> UnmetCode:
+    """The code of a reason that what is left over at a UAV only lacks this."""
+    if relaxation.more_range:
+        return UnmetCode.RANGE_USED
+    return UnmetCode.TIME_USED if relaxation.later_deadlines else UnmetCode.STEP_LIMIT

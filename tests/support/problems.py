@@ -57,3 +57,34 @@ def on_earth(problem: Problem, rng: np.random.Generator) -> Problem:
     )
     targets = tuple(move(t, ("x", "y")) for t in problem.targets)
     return replace(problem, uavs=uavs, targets=targets, crs="wgs84")
+
+
+def strained(problem: Problem, rng: np.random.Generator) -> Problem:
+    """The same problem with UAVs on their way or returning, short ranges, and deadlines that visits use up."""
+    uavs = []
+    for uav in problem.uavs:
+        place = {"x_c": uav.x_c, "y_c": uav.y_c}
+        if rng.random() < 0.4:
+            near = problem.targets[int(rng.integers(problem.n_targets))]
+            place = {"x_c": (uav.x_s + near.x) / 2, "y_c": (uav.y_s + near.y) / 2}
+        uavs.append(
+            replace(
+                uav,
+                **place,
+                voyage=uav.voyage * float(rng.uniform(0.2, 1.1)),
+                dis=uav.voyage * float(rng.choice([0.0, 0.1, 0.3])),
+                ret=bool(rng.random() < 0.1),
+            )
+        )
+    # The time in which a usual UAV flies across the scene.
+    across = problem.extent / float(np.median([uav.speed for uav in uavs]))
+    targets = tuple(
+        replace(
+            target,
+            deadline=across * float(rng.uniform(-0.1, 2.5)) if rng.random() < 0.5 else None,
+            service_time=across * float(rng.choice([0.0, 0.2, 1.0])),
+            level=target.level * float(10.0 ** rng.integers(-2, 2)),
+        )
+        for target in problem.targets
+    )
+    return replace(problem, uavs=tuple(uavs), targets=targets)

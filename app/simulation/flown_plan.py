@@ -1,0 +1,117 @@
+"""A plan as one more visit meets it: where every UAV is, when and with what, before each of its visits."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.simulation import simulator
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.unloading import Visits, visits_of
+
+CRUMB = 1e-9
+"""Share of a load or need below which what is left of it is rounding."""
+
+
+class FlownPlan(NamedTuple):
+    """The record of a legal plan of one problem; L is the length of its longest route.
+
+    Attributes
+    ----------
+    visits
+        Its routes. They have room for one visit more.
+    flown, clock
+        (M, L+1) distance and time before each visit, the last entry of a route after its last visit.
+    load
+        (M, L+1, K) what is aboard then.
+    need
+        (M, L+1, K) what the visit's target needs then.
+    value, leg
+        (M, L+1) what each visit earns after its distance is charged, and the length of its leg.
+    back
+        (M,) legs home.
+    remaining
+        (N, K) what is still needed at the end, without what is only rounding.
+    end_need
+        (N, K) the same as the simulator has it.
+    spare
+        (M, K) what is aboard at the end, without what is only rounding; nothing for a returning UAV.
+    """
+
+    visits: Visits
+    flown: Floats
+    clock: Floats
+    load: Floats
+    need: Floats
+    value: Floats
+    leg: Floats
+    back: Floats
+    remaining: Floats
+    end_need: Floats
+    spare: Floats
+
+
+def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, planned: bool) -> FlownPlan:
+    """Fly a legal plan and write down what one more visit would meet.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    actions, delivered
+        (S', M) joint actions and (S', M, K) what they unload.
+    planned
+        Whether these amounts are to be unloaded, not the simulator's own.
+    """
+    m, n, k = arrays.shape
+    steps = int((actions < n).sum(axis=0).max()) + 1
+    visits = visits_of(arrays._replace(max_steps=np.array([steps])), actions)
+    episodes = simulator.new_episodes(arrays, 1)
+    plan = FlownPlan(
+        visits,
+        np.zeros((m, steps)),
+        np.zeros((m, steps)),
+        np.zeros((m, steps, k)),
+        np.zeros((m, steps, k)),
+        np.zeros((m, steps)),
+        np.zeros((m, steps)),
+        np.zeros(m),
+        np.zeros((n, k)),
+        episodes.need[0],
+        np.zeros((m, k)),
+    )
+    _fly(arrays, episodes, plan, delivered, planned)
+    plan.remaining[:] = np.where(episodes.need[0] > CRUMB * arrays.need[0], episodes.need[0], 0.0)
+    left = np.where(episodes.load[0] > CRUMB * arrays.load[0], episodes.load[0], 0.0)
+    plan.spare[~arrays.ret[0]] = left[~arrays.ret[0]]
+    return plan
+
+
+@simulator.compiled
+def _fly(
+    arrays: ProblemArrays, episodes: simulator.Episodes, plan: FlownPlan, delivered: Floats, planned: bool
+) -> None:
+    m, materials = plan.load.shape[0], plan.load.shape[2]
+    visits = plan.visits
+    for s in range(plan.leg.shape[1]):
+        for i in range(m):
+            if s > visits.length[i]:
+                continue
+            plan.flown[i, s], plan.clock[i, s] = episodes.flown[0, i], episodes.clock[0, i]
+            for k in range(materials):
+                plan.load[i, s, k] = episodes.load[0, i, k]
+            if s == visits.length[i]:
+                continue
+            j = visits.target[i, s]
+            for k in range(materials):
+                plan.need[i, s, k] = episodes.need[0, j, k]
+            plan.leg[i, s] = simulator.leg_to(arrays, episodes, 0, i, j)
+            if planned:
+                before = episodes.satisfaction[0]
+                simulator.deliver(arrays, episodes, i, j, delivered, s)
+                plan.value[i, s] = episodes.satisfaction[0] - before - arrays.weight[0] * plan.leg[i, s]
+            else:
+                plan.value[i, s] = simulator.act(arrays, episodes, 0, i, j)
+    for i in range(m):
+        plan.back[i] = 0.0 if arrays.ret[0, i] else simulator.leg_home(arrays, episodes, 0, i)

@@ -1,0 +1,128 @@
+"""Reasons for unmet needs, and their remedies, in sentences with names and numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.domain.allocation import LaterDeadline, Relaxation
+from app.domain.problem import Problem
+from app.simulation.flown_plan import FlownPlan
+from app.simulation.openings import RANGE, STEP, TIME
+
+
+class Wording:
+    """Puts what was found about a plan into words.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    plan
+        Its plan.
+    """
+
+    def __init__(self, problem: Problem, plan: FlownPlan) -> None:
+        self._problem, self._plan = problem, plan
+
+    def missing(self, j: int) -> str:
+        """How much target `j` lacks of what it needed."""
+        left, needed = self._plan.remaining[j], self._problem.targets[j].loadlist
+        amounts = [f"{left[k]:.6g} of {needed[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0)]
+        return " and ".join(amounts) + " missing"
+
+    def no_supply(self) -> str:
+        """Nobody carries it."""
+        if all(uav.ret for uav in self._problem.uavs):
+            return "every UAV is returning"
+        return "no UAV that can be sent carries any of it"
+
+    def out_of_range(self, i: int, lacks: float) -> str:
+        """Nobody has the range; UAV `i` comes closest."""
+        return (
+            f"no UAV that carries any of it has the range: {self._uav(i)} comes closest and lacks {lacks:.6g}"
+        )
+
+    def deadline(self, i: int, late: float) -> str:
+        """Nobody can be in time; UAV `i` would be there first."""
+        return (
+            f"the fastest UAV that could serve it, {self._uav(i)}, would arrive {late:.6g} after its deadline"
+        )
+
+    def not_looked(self, i: int, spent: bool) -> str:
+        """UAV `i` could come, but nobody has looked further."""
+        why = (
+            "of so many areas only the most urgent were looked into"
+            if spent
+            else "no time was left to look further"
+        )
+        return f"{self._uav(i)} carries some of it and could be there in range and time; {why}"
+
+    def not_chosen(self, i: int, place: int, gain: float) -> str:
+        """One more visit earns something."""
+        visit = f"one more visit by {self._uav(i)}, {self._where(i, place)},"
+        return f"{visit} would earn {gain:.6g}; a better algorithm or more time finds it"
+
+    def used(self, i: int, place: int, j: int, lacks: Relaxation) -> str:
+        """The other visits of UAV `i` leave no room for one with what it has left over."""
+        why = (
+            [f"it lacks {lacks.more_range:.6g} of range to keep its other visits"] if lacks.more_range else []
+        )
+        why += [self._late(later, j) for later in lacks.later_deadlines]
+        why += ["all its decision steps are used"] if lacks.more_steps else []
+        visit = f"{self._uav(i)} has some of it left over and could come {self._where(i, place)}"
+        return f"{visit}, but {' and '.join(why)}"
+
+    def not_worth_it(self, i: int, place: int, gain: float, lacks: int) -> str:
+        """The best visit with something that is left over costs at least what it earns."""
+        needs = [name for kind, name in ((RANGE, "range"), (TIME, "time"), (STEP, "steps")) if lacks & kind]
+        even = f"even with the {' and '.join(needs)} that it lacks, " if needs else ""
+        visit = f"{even}one more visit by {self._uav(i)}, {self._where(i, place)},"
+        if gain < 0:
+            return f"{visit} would cost {-gain:.6g} more in distance than it earns"
+        return f"{visit} would earn no more than its distance costs"
+
+    def loads_used(self, gain: float | None) -> str:
+        """All that could be brought is unloaded elsewhere; a visit that takes it from there brings `gain`."""
+        says = "the UAVs that could bring it unload elsewhere all that it could use"
+        if gain is None:
+            return says
+        return f"{says}: bringing it here instead would " + (
+            f"cost {-gain:.6g}" if gain < 0 else "earn no more"
+        )
+
+    def even_then(self, gain: float) -> str:
+        """What the remedy of a hard reason costs, where it brings nothing."""
+        if gain < 0:
+            return f"; with the remedy the visit would still cost {-gain:.6g} more than it earns"
+        return "; with the remedy the visit would still earn no more than it costs"
+
+    def remedy(self, i: int, place: int, new: bool, relaxation: Relaxation | None) -> str:
+        """What would change it: another visit, or what has to be allowed for it."""
+        uav = self._uav(i)
+        if relaxation is None:
+            return f"{uav} flies there {self._where(i, place)}"
+        load = " and ".join(
+            f"{x:.6g} of material {k + 1}" for k, x in enumerate(relaxation.more_load) if x > 0
+        )
+        says = [f"{load} more aboard {uav}"] if load else []
+        if relaxation.more_range:
+            says.append(f"range +{relaxation.more_range:.6g} of {uav}")
+        says += [
+            f"a deadline {later.by:.6g} later for {later.target_id}" for later in relaxation.later_deadlines
+        ]
+        says += ["one more decision step"] if relaxation.more_steps else []
+        return ", ".join(says) + ("" if new else ", which flies there anyway")
+
+    def _late(self, later: LaterDeadline, j: int) -> str:
+        where = self._problem.targets[j].id
+        if later.target_id == where:
+            return f"it would arrive {later.by:.6g} after the deadline"
+        return f"it would then arrive {later.by:.6g} after the deadline of {later.target_id}"
+
+    def _uav(self, i: int) -> str:
+        return self._problem.uavs[i].id
+
+    def _where(self, i: int, place: int) -> str:
+        if place == 0:
+            return "first"
+        return f"after {self._problem.targets[int(self._plan.visits.target[i, place - 1])].id}"
