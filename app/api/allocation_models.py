@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.problem_models import ProblemModel, Whole, WireModel
+from app.domain.allocation import UnmetCode
 from app.domain.warnings import CODES as WARNING_CODES
 from app.solvers.registry import ALGORITHMS
 
@@ -99,33 +100,57 @@ class RouteModel(AnswerModel):
     stops: list[StopModel] = Field(description="Its visits")
 
 
+class LaterDeadlineModel(AnswerModel):
+    """A deadline that would have to be later."""
+
+    target_id: str = Field(description="The rescue area")
+    by: float = Field(description="How much later, in time units, or h")
+
+
+class RelaxationModel(AnswerModel):
+    """What a problem would have to allow more of."""
+
+    more_load: list[float] = Field(description="Amounts more aboard the UAV, one a material")
+    more_range: float = Field(description="Range more of the UAV")
+    more_steps: int = Field(description="Decision steps more")
+    later_deadlines: list[LaterDeadlineModel] = Field(description="Deadlines that would have to be later")
+
+
 class UnmetModel(AnswerModel):
     """A rescue area that does not get all it needs."""
 
     target_id: str = Field(description="The rescue area")
     remaining: list[float] = Field(description="Amounts still needed after the plan, one a material")
-    code: str = Field(
-        description="The reason, for programs: `no_supply` (no UAV carries it), `out_of_range`, `deadline`, "
-        "`step_limit`, `range_used` (by the other visits), `loads_used` (on more urgent areas), "
-        "`not_worth_it` (costs more distance than it earns), `not_chosen` (a better plan has been overlooked "
-        "or, where it is not `verified`, there may be one and no time was left to look)"
+    code: UnmetCode = Field(
+        description="The reason, for programs. " + " ".join(f"`{code}`: {code.meaning}" for code in UnmetCode)
     )
     reason: str = Field(description="The reason, for people, with its numbers")
     uav_id: str | None = Field(
         default=None, description="The UAV that could serve it, or comes closest to it; null: none"
     )
+    step: int | None = Field(
+        default=None,
+        description="The decision step, from 1, in which that UAV would visit it; its later visits come one "
+        "step later. Where the plan has this visit already and more is to be aboard, no other is needed.
+        null: not evaluated",
+    )
     remedy: str | None = Field(
         default=None, description="What would change it, for people; null: nothing simple would"
     )
+    relaxation: RelaxationModel | None = Field(
+        default=None,
+        description="What the problem has to allow for the remedy, for programs; null: nothing, or no remedy",
+    )
     reward_change: float | None = Field(
         default=None,
-        description="Change of the reward with one more visit to it once the remedy is there, or, without a "
-        "remedy, as things are; null: not evaluated",
+        description="Change of the reward with that visit once the remedy is there, or, without a remedy, as "
+        "things are; visits that it makes illegal are left out; null: not evaluated",
     )
     verified: bool = Field(
         default=False,
-        description="Whether the reason was verified by flying the plan with that visit on the simulator; "
-        "of very many unmet areas only the most urgent ones are",
+        description="Whether the reason is verified: where it depends on the plan, by the exact reward of "
+        "every single additional visit of any UAV at any place in its route; of very many unmet areas only "
+        "the most urgent ones are",
     )
 
 

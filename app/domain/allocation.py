@@ -143,8 +143,8 @@ class Unmet:
         The UAV that could serve it, or comes closest to it; None where there is none.
     step
         The decision step, from 1, in which that UAV would visit it: in one that is taken its later visits
-        come a step later. Where the plan has this visit already, no other is needed. None where nothing was
-        evaluated.
+        come a step later. Where the plan has this visit already and more is to be aboard, no other is
+        needed. None where nothing was evaluated.
     remedy
         What would change it, for people; None where nothing simple would.
     relaxation

@@ -11,7 +11,7 @@ from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.insertion import MADE, gain_of_visit, gets_more
+from app.simulation.insertion import MADE, Trial, gain_of_visit, gets_more
 from app.simulation.planned_insertion import MORE, SOME_KEPT, PlannedTrial, gain_of_planned_visit
 
 NO_VISIT = -1
@@ -42,14 +42,17 @@ class Counterfactuals:
     ----------
     problem, arrays
         The problem, and the same as a stack of one; they are not changed.
-    plan, trial
-        Its plan, and scratch space for it.
-    planned
-        Whether unloading is planned.
+    plan, trial, planned
+        Its plan, and scratch space for it; `planned` is None where unloading is greedy.
     """
 
     def __init__(
-        self, problem: Problem, arrays: ProblemArrays, plan: FlownPlan, trial: PlannedTrial, planned: bool
+        self,
+        problem: Problem,
+        arrays: ProblemArrays,
+        plan: FlownPlan,
+        trial: Trial,
+        planned: PlannedTrial | None,
     ) -> None:
         self._index = {target.id: j for j, target in enumerate(problem.targets)}
         self._given, self._plan, self._trial, self._planned = arrays, plan, trial, planned
@@ -82,15 +85,14 @@ class Counterfactuals:
         return outcome
 
     def _fly(self, i: int, place: int, j: int, reloaded: bool) -> Outcome:
-        arrays, plan, tally = self._arrays, self._plan, self._trial.trial.tally
-        if not self._planned:
-            gain = float(gain_of_visit(arrays, plan, self._trial.trial, i, place, j, reloaded))
-            made = place == NO_VISIT or bool(tally[MADE])
-            return Outcome(gain, made and bool(gets_more(plan, self._trial.trial, j)))
-        gain = float(gain_of_planned_visit(arrays, plan, self._trial, i, place, j, True))
-        if place != NO_VISIT and not tally[MADE]:
-            return Outcome(gain, False)
-        return Outcome(gain, bool(self._trial.known[SOME_KEPT, MORE]))
+        arrays, plan, trial = self._arrays, self._plan, self._trial
+        if self._planned is None:
+            gain = float(gain_of_visit(arrays, plan, trial, i, place, j, reloaded))
+            more = bool(gets_more(plan, trial, j))
+        else:
+            gain = float(gain_of_planned_visit(arrays, plan, trial, self._planned, i, place, j, True))
+            more = bool(self._planned.known[SOME_KEPT, MORE])
+        return Outcome(gain, more and (place == NO_VISIT or bool(trial.tally[MADE])))
 
 
 def relaxation_for(

@@ -14,7 +14,7 @@ import numpy as np
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.insertion import MADE, WORK, begin, gain_of_visit, need_at, take_up
+from app.simulation.insertion import MADE, WORK, Trial, begin, gain_of_visit, need_at, take_up
 from app.simulation.planned_insertion import PlannedTrial, gain_of_planned_visit, look_at_all_kept
 
 _WORK = 3_000_000
@@ -95,10 +95,8 @@ class Lookout:
     ----------
     arrays
         A stack of one problem.
-    plan, trial
-        Its plan, and scratch space for it.
-    planned
-        Whether unloading is planned.
+    plan, trial, planned
+        Its plan, and scratch space for it; `planned` is None where unloading is greedy.
     hurry
         Once it is true, no more is looked at.
     """
@@ -107,23 +105,22 @@ class Lookout:
         self,
         arrays: ProblemArrays,
         plan: FlownPlan,
-        trial: PlannedTrial,
-        planned: bool,
+        trial: Trial,
+        planned: PlannedTrial | None,
         hurry: Callable[[], bool],
     ) -> None:
-        self._arrays, self._plan, self._trial, self._planned = arrays, plan, trial, planned
-        self._hurry = hurry
-        self._easy = arrays._replace(
-            voyage=np.full_like(arrays.voyage, np.inf),
-            deadline=np.full_like(arrays.deadline, np.inf),
-            max_steps=arrays.max_steps + 1,
+        # Copies of what is eased for a while.
+        self._arrays = arrays._replace(
+            voyage=arrays.voyage.copy(), deadline=arrays.deadline.copy(), max_steps=arrays.max_steps.copy()
         )
-        self._lacking = np.zeros(plan.leg.shape[1] + 3)
+        self._plan, self._trial, self._planned, self._hurry = plan, trial, planned, hurry
+        room = plan.leg.shape[1] + 3
+        self._lacking, self._kept = np.zeros(room), np.zeros(room)
 
     @property
     def spent(self) -> bool:
         """Whether this answer has had its share of looking, however much time there is."""
-        return int(self._trial.trial.tally[WORK]) >= _WORK
+        return int(self._trial.tally[WORK]) >= _WORK
 
     def look(self, j: int, start: Start) -> Places | None:
         """Look at all places for a visit to target `j`; None if that cannot be finished."""
@@ -139,8 +136,8 @@ class Lookout:
             if self.spent or self._hurry():
                 return None
             i = _look(
-                self._arrays, self._easy, self._plan, self._trial, self._planned, j, comers, i,
-                self._lacking, found,
+                self._arrays, self._plan, self._trial, self._planned, j, comers, i,
+                self._lacking, self._kept, found,
             )  # fmt: skip
         return found
 
@@ -220,18 +217,21 @@ def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) 
 @simulator.compiled
 def _look(
     arrays: ProblemArrays,
-    easy: ProblemArrays,
     plan: FlownPlan,
-    trial: PlannedTrial,
-    planned: bool,
+    trial: Trial,
+    planned: PlannedTrial | None,
     j: int,
     comers: int,
     first: int,
     lacks: Floats,
+    kept: Floats,
     found: Places,
 ) -> int:
-    """Look at the routes of UAVs from `first` on, for a while; return the UAV to go on with."""
-    tally = trial.trial.tally
+    """Look at the routes of UAVs from `first` on, for a while; return the UAV to go on with.
+
+    Where `planned` is None, nothing that it is for is compiled.
+    """
+    tally = trial.tally
     end = tally[WORK] + _PIECE
     for i in range(first, plan.back.shape[0]):
         if tally[WORK] > end:
@@ -242,42 +242,67 @@ def _look(
         if _comes(arrays, plan, i, j, comers):
             for k in range(plan.spare.shape[1]):
                 left_over = left_over or (plan.spare[i, k] > 0.0 and plan.remaining[j, k] > 0.0)
-            if planned and not left_over:
-                left_over = look_at_all_kept(arrays, plan, trial, i, j)
+            if planned is not None:
+                left_over = left_over or look_at_all_kept(arrays, plan, trial, planned, i, j)
         if left_over:
             found.left_over[0] = 1
         for place in range(plan.visits.length[i] + 1):
             tally[WORK] += 1
             lack = lacking(arrays, plan, i, place, j, lacks)
             _note_loader(arrays, plan, i, place, j, lack, found)
-            gain = _gain(arrays, plan, trial, planned, i, place, j)
-            if tally[MADE] == 1:
-                _note(found, AS_IS, i, place, gain)
-                if left_over and lack == 0:
-                    _note(found, 0, i, place, gain)
-            if left_over and lack != 0:
-                gain = _gain(easy, plan, trial, planned, i, place, j)
-                if tally[MADE] == 1:
+            for easy in range(2):
+                if easy == 1:
+                    if lack == 0 or not left_over:
+                        continue
+                    _ease(arrays, plan, i, j, kept)
+                if planned is None:
+                    gain = _greedy_gain(arrays, plan, trial, i, place, j)
+                else:
+                    gain = gain_of_planned_visit(arrays, plan, trial, planned, i, place, j, False)
+                if easy == 1:
+                    _ease_no_more(arrays, plan, i, j, kept)
+                if tally[MADE] == 0:
+                    continue
+                if easy == 0:
+                    _note(found, AS_IS, i, place, gain)
+                if left_over and (easy == 1 or lack == 0):
                     _note(found, lack, i, place, gain)
     return int(plan.back.shape[0])
 
 
 @simulator.compiled
-def _gain(
-    arrays: ProblemArrays, plan: FlownPlan, trial: PlannedTrial, planned: bool, i: int, place: int, j: int
-) -> float:
-    """Change of the reward with a visit; ``tally[MADE]`` says whether it is legal."""
-    if planned:
-        return gain_of_planned_visit(arrays, plan, trial, i, place, j, False)
-    greedy = trial.trial
-    begin(greedy, i, place, j)
+def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
+    """Give a UAV range and its visits time and a step without limit; what they had is kept."""
+    length = plan.visits.length[i]
+    kept[0], kept[1] = arrays.voyage[0, i], arrays.deadline[0, j]
+    arrays.voyage[0, i], arrays.deadline[0, j] = np.inf, np.inf
+    for s in range(length):
+        x = plan.visits.target[i, s]
+        kept[2 + s], arrays.deadline[0, x] = arrays.deadline[0, x], np.inf
+    arrays.max_steps[0] += 1
+
+
+@simulator.compiled
+def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
+    """Undo :func:`_ease`: backwards, as a target may be visited twice."""
+    length = plan.visits.length[i]
+    arrays.max_steps[0] -= 1
+    for s in range(length):
+        arrays.deadline[0, plan.visits.target[i, length - 1 - s]] = kept[1 + length - s]
+    arrays.voyage[0, i], arrays.deadline[0, j] = kept[0], kept[1]
+
+
+@simulator.compiled
+def _greedy_gain(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> float:
+    """Change of the reward with a visit, at once where it is not legal."""
+    begin(trial, i, place, j)
     if place >= arrays.max_steps[0]:
         return 0.0
-    take_up(plan, greedy, i, place)
-    need_at(plan, greedy, j, place * plan.back.shape[0] + i)
-    if simulator.verdict(arrays, greedy.episodes, 0, i, j) != simulator.ALLOWED:
+    take_up(plan, trial, i, place)
+    need_at(plan, trial, j, place * plan.back.shape[0] + i)
+    if simulator.verdict(arrays, trial.episodes, 0, i, j) != simulator.ALLOWED:
         return 0.0
-    return gain_of_visit(arrays, plan, greedy, i, place, j, False)
+    return gain_of_visit(arrays, plan, trial, i, place, j, False)
 
 
 @simulator.compiled

@@ -25,7 +25,6 @@ from app.simulation.insertion import (
     begin,
     charge,
     gain,
-    new_trial,
 )
 from app.simulation.unloading import NONE, ROUNDING, Unloading, Visits, new_unloading, serve, visits_of
 
@@ -37,12 +36,10 @@ ALL_KEPT, SOME_KEPT = range(2)
 
 
 class PlannedTrial(NamedTuple):
-    """One additional visit, and scratch space for working out what it adds.
+    """Scratch space for working out what an additional visit adds.
 
     Attributes
     ----------
-    trial
-        Of the visit.
     visits
         The plan's; changed during a trial, and put back.
     unloading
@@ -61,7 +58,6 @@ class PlannedTrial(NamedTuple):
         the satisfaction, whether the target gets more.
     """
 
-    trial: Trial
     visits: Visits
     unloading: Unloading
     worth: Floats
@@ -72,18 +68,14 @@ class PlannedTrial(NamedTuple):
     known: Integers
 
 
-def new_planned_trial(
-    arrays: ProblemArrays, plan: FlownPlan, actions: Integers, planned: bool
-) -> PlannedTrial:
-    """Make scratch space for trials of a plan; if unloading is planned, work out what each target earns."""
+def new_planned_trial(arrays: ProblemArrays, plan: FlownPlan, actions: Integers) -> PlannedTrial:
+    """Make the scratch space for trials of a plan, and work out what it earns at each target."""
     steps = plan.leg.shape[1]
     room = arrays._replace(max_steps=np.array([steps]))
     visits, unloading = visits_of(room, actions), new_unloading(room)
     unloading.served[:] = unloading.order
-    if planned:
-        serve(arrays, visits, unloading, len(unloading.served))
+    serve(arrays, visits, unloading, len(unloading.served))
     return PlannedTrial(
-        new_trial(arrays, plan),
         visits,
         unloading,
         unloading.value.copy(),
@@ -97,7 +89,14 @@ def new_planned_trial(
 
 @simulator.compiled
 def gain_of_planned_visit(
-    arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, i: int, place: int, j: int, exact: bool
+    arrays: ProblemArrays,
+    plan: FlownPlan,
+    trial: Trial,
+    planned: PlannedTrial,
+    i: int,
+    place: int,
+    j: int,
+    exact: bool,
 ) -> float:
     """As :func:`app.simulation.insertion.gain_of_visit`, where unloading is planned.
 
@@ -105,40 +104,41 @@ def gain_of_planned_visit(
     ----------
     arrays, plan, i, place, j
         As there.
-    planned
+    trial, planned
         Scratch space. ``trial.tally[MADE]`` says whether the visit was legal and unloads something.
     exact
         Otherwise a visit that cannot gain may have any change that is not above 0, and every UAV has the
         load that it has in the plan. An exact gain is in row SOME_KEPT, whether some are kept or all.
     """
-    trial = planned.trial
     begin(trial, i, place, j)
-    whole = _keep_legal(arrays, plan, planned)
+    whole = _keep_legal(arrays, plan, trial, planned)
     if place >= 0 and trial.tally[MADE] == 0:
         return 0.0
     row = SOME_KEPT if exact or not whole else ALL_KEPT
     if exact:
-        _amounts_anew(arrays, plan, planned, row)
+        _amounts_anew(arrays, plan, trial, planned, row)
     else:
-        look_at_all_kept(arrays, plan, planned, i, j)
+        look_at_all_kept(arrays, plan, trial, planned, i, j)
         if not whole:
-            _charge_own_way(arrays, plan, planned, ALL_KEPT)
+            _charge_own_way(arrays, plan, trial, planned, ALL_KEPT)
             most: float = trial.total[GAIN] + planned.change[ALL_KEPT, GAIN]
             if most <= 0.0:
                 return most
             trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
-            _amounts_anew(arrays, plan, planned, row)
+            _amounts_anew(arrays, plan, trial, planned, row)
     if planned.known[row, UNLOADS] == 0:
         trial.tally[MADE] = 0
         return 0.0
-    _charge_own_way(arrays, plan, planned, row)
+    _charge_own_way(arrays, plan, trial, planned, row)
     trial.total[GAIN] += planned.change[row, GAIN]
     trial.total[TURNOVER] += planned.change[row, TURNOVER]
     return gain(trial)
 
 
 @simulator.compiled
-def look_at_all_kept(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, i: int, j: int) -> bool:
+def look_at_all_kept(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, i: int, j: int
+) -> bool:
     """Work out what a visit adds where nothing becomes illegal by it, unless it is known already.
 
     Returns
@@ -146,19 +146,19 @@ def look_at_all_kept(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTri
     bool
         Whether it adds to the satisfaction.
     """
-    known, trial = planned.known, planned.trial
+    known = planned.known
     if known[ALL_KEPT, UAV] != i or known[ALL_KEPT, TARGET] != j:
         trial.inserted[0], trial.inserted[2] = i, j
         place, trial.inserted[1] = trial.inserted[1], 0
-        _amounts_anew(arrays, plan, planned, ALL_KEPT)
+        _amounts_anew(arrays, plan, trial, planned, ALL_KEPT)
         trial.inserted[1] = place
     return bool(known[ALL_KEPT, ADDS] == 1)
 
 
 @simulator.compiled
-def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial) -> bool:
+def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial) -> bool:
     """Fly the UAV's route with the additional visit, and note what stays legal; say whether all does."""
-    trial, whole = planned.trial, True
+    whole = True
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     episodes, length = trial.episodes, plan.visits.length[i]
     episodes.at[0, i] = simulator.START
@@ -187,9 +187,11 @@ def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial) -
 
 
 @simulator.compiled
-def _amounts_anew(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, row: int) -> None:
+def _amounts_anew(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int
+) -> None:
     """Work out the best amounts with the additional visit, and fill a row of what is known from them."""
-    trial, visits, unloading = planned.trial, planned.visits, planned.unloading
+    visits, unloading = planned.visits, planned.unloading
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     m, length = plan.back.shape[0], plan.visits.length[i]
     # A visit that is given up becomes another one to the additional target, which changes nothing there.
@@ -201,11 +203,11 @@ def _amounts_anew(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial,
         visits.target[i, length] = j
         _move(visits, length * m + i, NONE, j)
         visits.length[i] += 1
-    count = _connected(plan, planned)
+    count = _connected(plan, trial, planned)
     serve(arrays, visits, unloading, count)
     trial.tally[WORK] += unloading.number[2] + count
     unloading.number[2] = 0
-    _fill_row(arrays, plan, planned, row, count)
+    _fill_row(arrays, plan, trial, planned, row, count)
     if place >= 0:
         visits.length[i] -= 1
         _move(visits, length * m + i, j, NONE)
@@ -216,9 +218,11 @@ def _amounts_anew(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial,
 
 
 @simulator.compiled
-def _fill_row(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, row: int, count: int) -> None:
+def _fill_row(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int, count: int
+) -> None:
     """Compare the new amounts of the connected targets with the plan's."""
-    trial, visits, unloading = planned.trial, planned.visits, planned.unloading
+    visits, unloading = planned.visits, planned.unloading
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     m = plan.back.shape[0]
     gained, turned = trial.total[GAIN], trial.total[TURNOVER]
@@ -238,7 +242,7 @@ def _fill_row(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, row
             if h == i:
                 planned.idle[row, s] = planned.left_out[s]
         if idle and h != i:
-            _charge_way(arrays, plan, planned, h, NONE, j)
+            _charge_way(arrays, plan, trial, planned, h, NONE, j)
     planned.change[row, GAIN], planned.change[row, TURNOVER] = trial.total[GAIN], trial.total[TURNOVER]
     trial.total[GAIN], trial.total[TURNOVER] = gained, turned
     planned.known[row, UNLOADS] = 1 if place < 0 or _can_unload(arrays, planned, i, j) else 0
@@ -258,8 +262,8 @@ def _fill_row(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, row
 def _can_unload(arrays: ProblemArrays, planned: PlannedTrial, i: int, j: int) -> bool:
     """Whether every visit of UAV `i` to target `j` can unload something.
 
-    It unloads something in all of them together, which can be shared among them; or it has something left over,
-    which it can bring in place of somebody else.
+    It unloads something in all of them together, which they can share; or it has something left over, that it
+    can bring in place of another UAV.
     """
     visits, unloading, m = planned.visits, planned.unloading, planned.visits.length.shape[0]
     for k in range(unloading.amount.shape[1]):
@@ -288,21 +292,22 @@ def _unloads_nothing(arrays: ProblemArrays, planned: PlannedTrial, slot: int) ->
 
 
 @simulator.compiled
-def _charge_own_way(arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, row: int) -> None:
+def _charge_own_way(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int
+) -> None:
     """Charge the way of the UAV of the additional visit past what it still visits."""
-    trial = planned.trial
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     for s in range(plan.visits.length[i]):
         planned.left_out[s] = not planned.kept[s] or planned.idle[row, s]
-    _charge_way(arrays, plan, planned, i, place, j)
+    _charge_way(arrays, plan, trial, planned, i, place, j)
 
 
 @simulator.compiled
 def _charge_way(
-    arrays: ProblemArrays, plan: FlownPlan, planned: PlannedTrial, h: int, place: int, j: int
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, h: int, place: int, j: int
 ) -> None:
     """Charge the legs of a route that differ from the plan's: `j` is added, ``left_out`` are not flown."""
-    trial, episodes = planned.trial, planned.trial.episodes
+    episodes = trial.episodes
     length, weight = plan.visits.length[h], arrays.weight[0]
     episodes.at[0, h] = simulator.START
     before = simulator.START
@@ -350,9 +355,9 @@ def _move(visits: Visits, slot: int, old: int, new: int) -> None:
 
 
 @simulator.compiled
-def _connected(plan: FlownPlan, planned: PlannedTrial) -> int:
+def _connected(plan: FlownPlan, trial: Trial, planned: PlannedTrial) -> int:
     """List the targets that visits connect with the additional one, by their rank, and their UAVs."""
-    trial, visits, unloading = planned.trial, planned.visits, planned.unloading
+    visits, unloading = planned.visits, planned.unloading
     trial.tally[MARK] += 1
     trial.tally[CHANGED] = 0
     m, found = plan.back.shape[0], 1

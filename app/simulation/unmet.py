@@ -19,6 +19,7 @@ from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
+from app.simulation.insertion import new_trial
 from app.simulation.openings import (
     AS_IS,
     NONE,
@@ -63,12 +64,10 @@ def unmet_targets(
         return ()
     share = plan.remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
     urgent = open_targets[np.argsort(-arrays.level[0, open_targets] * share, kind="stable")]
-    trial = new_planned_trial(arrays, plan, actions, planned)
+    scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
     start = look_from_start(arrays, plan, open_targets)
-    lookout = Lookout(arrays, plan, trial, planned, hurry)
-    judge = _Judge(
-        problem, arrays, plan, start, lookout, Counterfactuals(problem, arrays, plan, trial, planned)
-    )
+    lookout = Lookout(arrays, plan, *scratch, hurry)
+    judge = _Judge(problem, arrays, plan, start, lookout, Counterfactuals(problem, arrays, plan, *scratch))
     found = {int(j): judge.reason(int(j)) for j in urgent}
     return tuple(found[int(j)] for j in open_targets)
 
@@ -191,7 +190,8 @@ class _Judge:
             yield _Remedy(i, place, relaxation_for(self._problem, self._more_load(i, place, j)), new=False)
             slot = int(visits.following[slot])
         for i, place in zip(places.loader.tolist(), places.loader_place.tolist(), strict=True):
-            if i != NONE:
+            there = place < int(visits.length[i]) and int(visits.target[i, place]) == j
+            if i != NONE and not there:
                 step, more_range, late = self._lookout.lacking(i, place, j)
                 more_load = self._more_load(i, place, j)
                 yield _Remedy(i, place, relaxation_for(self._problem, more_load, more_range, int(step), late))

@@ -4,7 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.domain.plan import Plan
 from app.domain.problem import Objective, Problem
+from app.simulation import simulator
+from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate
 
 
@@ -60,7 +63,7 @@ def on_earth(problem: Problem, rng: np.random.Generator) -> Problem:
 
 
 def strained(problem: Problem, rng: np.random.Generator) -> Problem:
-    """The same problem with UAVs on their way or returning, short ranges, and deadlines that visits use up."""
+    """The same problem with UAVs on their way or returning, short ranges, and deadlines that bind."""
     uavs = []
     for uav in problem.uavs:
         place = {"x_c": uav.x_c, "y_c": uav.y_c}
@@ -88,3 +91,20 @@ def strained(problem: Problem, rng: np.random.Generator) -> Problem:
         for target in problem.targets
     )
     return replace(problem, uavs=tuple(uavs), targets=targets)
+
+
+def random_plan(problem: Problem, rng: np.random.Generator) -> Plan:
+    """A random plan that is legal under greedy unloading."""
+    arrays = compile_problem(problem)
+    episodes = simulator.new_episodes(arrays, 1)
+    rows = []
+    for _ in range(problem.max_steps):
+        row = []
+        for i in range(problem.n_uavs):
+            rules = [simulator.verdict(arrays, episodes, 0, i, j) for j in range(problem.n_targets)]
+            allowed = [j for j, rule in enumerate(rules) if rule == simulator.ALLOWED]
+            stays = not allowed or rng.random() < 0.15
+            row.append(problem.n_targets if stays else int(rng.choice(allowed)))
+            simulator.act(arrays, episodes, 0, i, row[-1])
+        rows.append(tuple(row))
+    return Plan(tuple(rows))

@@ -1,7 +1,7 @@
 """Holds reasons for unmet needs against the plan with every single additional visit.
 
-It replays plans with the referee, and planned unloading as a linear program solved by HiGHS; it shares no code with
-the product. Problems and answers are JSON-shaped.
+It replays plans with the referee, and planned unloading as a linear program solved by HiGHS; it shares no
+code with the product. Problems and answers are JSON-shaped.
 """
 
 from __future__ import annotations
@@ -17,13 +17,11 @@ CRUMB = 1e-9
 def routes_of_plan(problem, assignment):
     """The targets of each UAV in order."""
     n = len(problem["targets"])
-    return [
-        [row[i] for row in assignment if row[i] < n] for i in range(len(problem["uavs"]))
-    ]
+    return [[row[i] for row in assignment if row[i] < n] for i in range(len(problem["uavs"]))]
 
 
 def earned(problem, routes):
-    """Reward of the best legal plan that flies these routes, leaving out what is not allowed; and what is left.
+    """Reward of the plan that flies these routes and leaves out what is not allowed.
 
     Under planned unloading, range and deadlines decide what is allowed.
     """
@@ -73,7 +71,7 @@ def is_earned(problem, routes, reward, scale):
 
 
 def can_unload(problem, routes, i, j):
-    """Whether a visit of these routes can unload something under planned unloading, and nothing is lost by it."""
+    """Whether a visit can unload something under planned unloading without any loss."""
     if (problem.get("objective") or {}).get("unloading") != "planned":
         return True
     flown = [tuple(legal_by_reach(problem, h, route)[0]) for h, route in enumerate(routes)]
@@ -163,16 +161,15 @@ def with_visit(problem, routes, unmet):
     i = [uav["id"] for uav in problem["uavs"]].index(unmet["uav_id"])
     j = [area["id"] for area in problem["targets"]].index(unmet["target_id"])
     place, changed = unmet["step"] - 1, list(routes)
-    if unmet["relaxation"] is not None and any(unmet["relaxation"]["more_load"]):
-        if "flies there anyway" in unmet["remedy"]:
-            assert routes[i][place] == j
-            return changed
+    there = place < len(routes[i]) and routes[i][place] == j
+    if there and unmet["relaxation"] is not None and any(unmet["relaxation"]["more_load"]):
+        return changed
     changed[i] = [*routes[i][:place], j, *routes[i][place:]]
     return changed
 
 
 def could_come(problem, unmet, j):
-    """UAVs that carry, at first, something that is still needed and could be there directly in range and time."""
+    """UAVs that carry, at first, something still needed, and could be there directly in range and time."""
     return [
         i
         for i, uav in enumerate(problem["uavs"])
@@ -211,14 +208,17 @@ def objections(problem, answer, unmet):
     useful = [
         i
         for i in comers
-        if any(a > 0 and b > 0 for a, b in zip(left_over(problem, answer, i), unmet["remaining"], strict=True))
+        if any(
+            a > 0 and b > 0 for a, b in zip(left_over(problem, answer, i), unmet["remaining"], strict=True)
+        )
     ]
     if code == "loads_used" and unmet["verified"] and useful:
         found.append(f"something useful is left over at {useful}")
     carriers = [
         uav
         for uav in problem["uavs"]
-        if not uav.get("ret") and any(a > 0 and b > 0 for a, b in zip(uav["loadlist"], unmet["remaining"], strict=True))
+        if not uav.get("ret")
+        and any(a > 0 and b > 0 for a, b in zip(uav["loadlist"], unmet["remaining"], strict=True))
     ]
     if (code == "no_supply") != (not carriers):
         found.append(f"{len(carriers)} carry it")
@@ -229,8 +229,12 @@ def objections(problem, answer, unmet):
         easier = relaxed(problem, unmet)
         changed = with_visit(problem, routes, unmet)
         after = earned(easier, changed)
-        if abs(after - reward - change) > 10 * scale and not is_earned(easier, changed, reward + change, scale):
+        if abs(after - reward - change) > 10 * scale and not is_earned(
+            easier, changed, reward + change, scale
+        ):
             found.append(f"the change is {after - reward}, not {change}")
-    if code in ("range_used", "time_used", "step_limit") and not (unmet["verified"] and change > 0 and unmet["remedy"]):
+    if code in ("range_used", "time_used", "step_limit") and not (
+        unmet["verified"] and change > 0 and unmet["remedy"]
+    ):
         found.append("no remedy")
     return found
