@@ -131,8 +131,8 @@ class UnmetModel(AnswerModel):
     step: int | None = Field(
         default=None,
         description="The decision step, from 1, in which that UAV would visit it; its later visits come one "
-        "step later. Where the plan has this visit already and more is to be aboard, no other is needed.
-        null: not evaluated",
+        "step later. Where the plan has this visit already and more is to be aboard, no other is needed. "
+        "null: not evaluated",
     )
     remedy: str | None = Field(
         default=None, description="What would change it, for people; null: nothing simple would"

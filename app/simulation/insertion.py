@@ -157,21 +157,33 @@ def gain(trial: Trial) -> float:
 
 
 @simulator.compiled
-def take_up(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
-    """Put UAV `i` where it is in the plan before its visit `place`, with what it has then."""
+def move_to(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
+    """Put UAV `i` where it is in the plan before its visit `place`."""
     episodes = trial.episodes
     episodes.at[0, i] = simulator.START if place == 0 else plan.visits.target[i, place - 1]
     episodes.flown[0, i], episodes.clock[0, i] = plan.flown[i, place], plan.clock[i, place]
     episodes.ret[0, i] = False
-    for k in range(plan.load.shape[2]):
-        episodes.load[0, i, k] = plan.load[i, place, k]
 
 
 @simulator.compiled
-def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> None:
-    """Give target `j` the need that it has in the plan before a slot, unless the trial has changed it."""
+def take_up(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
+    """Put UAV `i` where it is in the plan before its visit `place`, with what it has then."""
+    move_to(plan, trial, i, place)
+    for k in range(plan.load.shape[2]):
+        trial.episodes.load[0, i, k] = plan.load[i, place, k]
+
+
+@simulator.compiled
+def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
+    """Give target `j` the need that it has in the plan just before a slot, unless the trial has changed it.
+
+    Returns
+    -------
+    bool
+        Whether it is unchanged, and has no visits in the plan from the slot on.
+    """
     if trial.target_mark[j] == trial.tally[MARK]:
-        return
+        return False
     m = plan.back.shape[0]
     later = plan.visits.first[j]
     while later != NONE and later < slot:
@@ -181,6 +193,27 @@ def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> None:
             trial.episodes.need[0, j, k] = plan.end_need[j, k]
         else:
             trial.episodes.need[0, j, k] = plan.need[later % m, later // m, k]
+    return bool(later == NONE)
+
+
+@simulator.compiled
+def gain_of_undisturbed_visit(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int
+) -> float:
+    """As :func:`gain_of_visit` for a visit that changes nothing but the way of its UAV.
+
+    The UAV and the target are as they are in the plan at that place.
+    """
+    weight = arrays.weight[0]
+    trial.tally[MADE] = 1
+    charge(trial, simulator.act(arrays, trial.episodes, 0, i, j))
+    if place < plan.visits.length[i]:
+        charge(trial, weight * plan.leg[i, place])
+        charge(trial, -weight * arrays.between[0, j, plan.visits.target[i, place]])
+    elif arrays.charge_return[0]:
+        charge(trial, weight * plan.back[i])
+        charge(trial, -weight * simulator.leg_home(arrays, trial.episodes, 0, i))
+    return gain(trial)
 
 
 @simulator.compiled

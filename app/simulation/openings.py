@@ -14,10 +14,21 @@ import numpy as np
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.insertion import MADE, WORK, Trial, begin, gain_of_visit, need_at, take_up
+from app.simulation.insertion import (
+    MADE,
+    WORK,
+    Trial,
+    begin,
+    gain_of_undisturbed_visit,
+    gain_of_visit,
+    move_to,
+    need_at,
+    take_up,
+)
 from app.simulation.planned_insertion import PlannedTrial, gain_of_planned_visit, look_at_all_kept
+from app.simulation.shortfalls import RANGE, STEP, TIME, detour, is_late, lacking
 
-_WORK = 3_000_000
+_WORK = 700_000
 """Visits flown for all areas of an answer: some tenths of a second. Beyond, no more are looked at."""
 
 _PIECE = 40_000
@@ -25,9 +36,6 @@ _PIECE = 40_000
 
 NONE = -1
 """In place of a UAV: there is none."""
-
-STEP, RANGE, TIME = 1, 2, 4
-"""What a visit lacks, as a sum, where the UAV keeps all the others of its route."""
 
 AS_IS = 8
 """Place in :class:`Places`, after those for every sum of what is lacking, of the best visit that is legal."""
@@ -62,7 +70,7 @@ class Places(NamedTuple):
         the reward once that is there: 0 where they lack nothing. The last one is the best of all visits that
         are legal in the plan, whatever they take from others.
     loader, loader_place, hope
-        (4,) UAVs that could come with more aboard, by how many things they lack beside, where in their
+        (2,) the best UAV with more aboard, and the best one that lacks something beside, where in their
         routes, and what that would earn at most.
     left_over
         (1,) whether any UAV that could come has something useful left over.
@@ -129,7 +137,7 @@ class Lookout:
             comers = _IN_TIME
         found = Places(
             np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
-            np.full(4, NONE, np.int64), np.zeros(4, np.int64), np.full(4, -np.inf), np.zeros(1, np.int64),
+            np.full(2, NONE, np.int64), np.zeros(2, np.int64), np.full(2, -np.inf), np.zeros(1, np.int64),
         )  # fmt: skip
         i = 0
         while i < self._arrays.shape[0]:
@@ -157,12 +165,6 @@ class Lookout:
                 if is_late(after, float(self._arrays.deadline[0, x])):
                     late[x] = max(after, late.get(x, 0.0))
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
-
-
-@simulator.compiled
-def is_late(after: float, deadline: float) -> bool:
-    """Whether an arrival that is so long after a deadline is too late."""
-    return after > abs(deadline) * simulator.TOLERANCE
 
 
 @simulator.compiled
@@ -248,15 +250,23 @@ def _look(
             found.left_over[0] = 1
         for place in range(plan.visits.length[i] + 1):
             tally[WORK] += 1
+            hope = _hope(arrays, plan, i, place, j)
+            legal = True
+            if planned is None:
+                legal = _is_legal(arrays, plan, trial, i, place, j)
+            if not legal and not left_over and hope <= min(found.hope[0], found.hope[1]):
+                continue
             lack = lacking(arrays, plan, i, place, j, lacks)
-            _note_loader(arrays, plan, i, place, j, lack, found)
+            _note_loader(found, i, place, hope, lack)
             for easy in range(2):
+                if easy == 0 and not legal:
+                    continue
                 if easy == 1:
                     if lack == 0 or not left_over:
                         continue
                     _ease(arrays, plan, i, j, kept)
                 if planned is None:
-                    gain = _greedy_gain(arrays, plan, trial, i, place, j)
+                    gain = _greedy_gain(arrays, plan, trial, i, place, j, easy == 1 or lack == 0)
                 else:
                     gain = gain_of_planned_visit(arrays, plan, trial, planned, i, place, j, False)
                 if easy == 1:
@@ -293,15 +303,34 @@ def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: 
 
 
 @simulator.compiled
-def _greedy_gain(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> float:
-    """Change of the reward with a visit, at once where it is not legal."""
-    begin(trial, i, place, j)
+def _is_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
+    """Whether a visit is legal, where unloading is greedy."""
     if place >= arrays.max_steps[0]:
-        return 0.0
+        return False
+    begin(trial, i, place, j)
+    move_to(plan, trial, i, place)
+    if simulator.reach_verdict(arrays, trial.episodes, 0, i, j) != simulator.ALLOWED:
+        return False
     take_up(plan, trial, i, place)
     need_at(plan, trial, j, place * plan.back.shape[0] + i)
-    if simulator.verdict(arrays, trial.episodes, 0, i, j) != simulator.ALLOWED:
-        return 0.0
+    return simulator.verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+
+
+@simulator.compiled
+def _greedy_gain(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int, keeps_all: bool
+) -> float:
+    """Change of the reward with a legal visit; quick where it takes nothing from other visits."""
+    begin(trial, i, place, j)
+    take_up(plan, trial, i, place)
+    alone = need_at(plan, trial, j, place * plan.back.shape[0] + i) and keeps_all
+    length = plan.visits.length[i]
+    if alone and place < length:
+        for k in range(plan.load.shape[2]):
+            taken = min(plan.load[i, place, k], trial.episodes.need[0, j, k])
+            alone = alone and taken <= plan.load[i, length, k]
+    if alone:
+        return gain_of_undisturbed_visit(arrays, plan, trial, i, place, j)
     return gain_of_visit(arrays, plan, trial, i, place, j, False)
 
 
@@ -313,79 +342,19 @@ def _note(found: Places, which: int, i: int, place: int, gain: float) -> None:
 
 
 @simulator.compiled
-def _note_loader(
-    arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, lack: int, found: Places
-) -> None:
-    """Keep a visit with more aboard if it could earn most of those that lack as many things beside."""
-    number = (lack & STEP) // STEP + (lack & RANGE) // RANGE + (lack & TIME) // TIME
+def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
+    """What a visit would earn that brings all that is still needed and takes nothing from others."""
     still = 0.0
     for k in range(plan.remaining.shape[1]):
         still += plan.remaining[j, k]
-    hope = arrays.level[0, j] * still / arrays.need_total[0, j]
-    hope -= arrays.weight[0] * _detour(arrays, plan, i, place, j)
-    if hope > found.hope[number]:
-        found.loader[number], found.loader_place[number], found.hope[number] = i, place, hope
+    hope: float = arrays.level[0, j] * still / arrays.need_total[0, j]
+    hope -= arrays.weight[0] * detour(arrays, plan, i, place, j)
+    return hope
 
 
 @simulator.compiled
-def _leg(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
-    """Distance to a target from where a UAV is before its visit `place`."""
-    at = simulator.START if place == 0 else plan.visits.target[i, place - 1]
-    leg: float = arrays.start_target[0, i, j] if at == simulator.START else arrays.between[0, at, j]
-    return leg
-
-
-@simulator.compiled
-def _detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
-    """Distance to a target and on to the next one, more than there directly."""
-    detour = _leg(arrays, plan, i, place, j)
-    if place < plan.visits.length[i]:
-        detour += arrays.between[0, j, plan.visits.target[i, place]] - plan.leg[i, place]
-    elif arrays.charge_return[0]:
-        detour += arrays.home[0, i, j] - plan.back[i]
-    return detour
-
-
-@simulator.compiled
-def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, lacks: Floats) -> int:
-    """What a UAV lacks for one more visit, if it keeps all others.
-
-    Parameters
-    ----------
-    arrays, plan
-        The problem and its plan.
-    i, place, j
-        The visit.
-    lacks
-        Filled: 1 where a step is missing, range, and how long after the deadlines it and all later visits
-        arrive.
-
-    Returns
-    -------
-    int
-        The sum of what is lacking, beyond the tolerance.
-    """
-    length, speed, voyage = plan.visits.length[i], arrays.speed[0, i], arrays.voyage[0, i]
-    there, detour = _leg(arrays, plan, i, place, j), _detour(arrays, plan, i, place, j)
-    lack = 0
-    lacks[0] = 0.0
-    if length >= arrays.max_steps[0]:
-        lacks[0], lack = 1.0, STEP
-    reach = plan.flown[i, place] + there
-    if arrays.return_to_base[0]:
-        reach += arrays.home[0, i, j]
-    lacks[1] = reach - voyage
-    lacks[2] = plan.clock[i, place] + there / speed - arrays.deadline[0, j]
-    late = is_late(lacks[2], arrays.deadline[0, j])
-    for s in range(place, length):
-        x = plan.visits.target[i, s]
-        reach = plan.flown[i, s + 1] + detour
-        if arrays.return_to_base[0]:
-            reach += arrays.home[0, i, x]
-        lacks[1] = max(lacks[1], reach - voyage)
-        arrival = plan.clock[i, s] + (plan.leg[i, s] + detour) / speed + arrays.service[0, j]
-        lacks[3 + s - place] = arrival - arrays.deadline[0, x]
-        late = late or is_late(lacks[3 + s - place], arrays.deadline[0, x])
-    if lacks[1] > voyage * simulator.TOLERANCE:
-        lack += RANGE
-    return lack + TIME if late else lack
+def _note_loader(found: Places, i: int, place: int, hope: float, lack: int) -> None:
+    """Keep a visit with more aboard if there is more to hope from it."""
+    which = 0 if lack == 0 else 1
+    if hope > found.hope[which]:
+        found.loader[which], found.loader_place[which], found.hope[which] = i, place, hope

@@ -23,16 +23,13 @@ from app.simulation.insertion import new_trial
 from app.simulation.openings import (
     AS_IS,
     NONE,
-    RANGE,
-    STEP,
-    TIME,
     Lookout,
     Places,
     Start,
-    is_late,
     look_from_start,
 )
 from app.simulation.planned_insertion import new_planned_trial
+from app.simulation.shortfalls import RANGE, STEP, TIME, is_late
 from app.simulation.unmet_wording import Wording
 
 _RELAXED = (STEP, RANGE, TIME, STEP + RANGE, STEP + TIME, RANGE + TIME, STEP + RANGE + TIME)

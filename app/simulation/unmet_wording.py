@@ -7,7 +7,7 @@ import numpy as np
 from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.openings import RANGE, STEP, TIME
+from app.simulation.shortfalls import RANGE, STEP, TIME
 
 
 class Wording:
