@@ -141,6 +141,7 @@ def _improve(
     possible = len(near.active) > 0 and len(near.wanted) > 0
     visits = arrays.shape[0] * int(arrays.max_steps[0])
     moves, limit, heat = _MOVES_A_VISIT * visits, stop.seconds_left(), 0.0
+    known = float(planned.search.best[0])
     for number in range(1, _ROUNDS + 1):
         while possible and not stop():
             share = _share_done(planned, moves, limit, stop) * _ROUNDS - (number - 1)
@@ -149,7 +150,10 @@ def _improve(
             _piece(planned, rng, moves, heat, max(share, 0.0))
             done = _share_done(planned, moves, limit, stop)
             heat = min(1.0, planned.tally[MOVES] / max(done, 1e-9) / (_PATIENT_MOVES_A_VISIT * visits))
-        incumbent.consider_actions(actions_of(planned.search))
+        # To unload a large plan at best takes a while, also when time is up.
+        if planned.search.best[0] > known:
+            known = float(planned.search.best[0])
+            incumbent.consider_actions(actions_of(planned.search))
         history.add(epoch + number, incumbent.reward)
         fraction = _ALGORITHM_SHARE + (1 - _ALGORITHM_SHARE) * number / _ROUNDS
         report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
