@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.domain.problem import ROUNDING
 from app.simulation import simulator
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import CRUMB, FlownPlan
@@ -26,7 +27,7 @@ from app.simulation.insertion import (
     charge,
     gain,
 )
-from app.simulation.unloading import NONE, ROUNDING, Unloading, Visits, new_unloading, serve, visits_of
+from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve, visits_of
 
 UAV, TARGET, UNLOADS, ADDS, MORE = range(5)
 """Places in a row of ``PlannedTrial.known``."""
