@@ -59,8 +59,8 @@ class LocalExecutor(SlotExecutor["_Worker"]):
     log_level
         What the workers log at least, to their standard error; None leaves Python's own way.
     niceness
-        By how much the workers leave the cores to others: the service's own process, which takes requests in
-        and sends answers, must not wait for searches that use all there is.
+        By how much warm workers leave the cores to others: the service's own process, which takes requests
+        in and sends answers, must not wait for searches that use all there is.
     """
 
     def __init__(
@@ -75,9 +75,9 @@ class LocalExecutor(SlotExecutor["_Worker"]):
     ) -> None:
         super().__init__(slots)
         self._working: set[_Worker] = set()
-        self._warm_up = partial(worker.warm_up, warm_up, *warm_up_arguments)
+        self._warm_up = partial(worker.warm_up, warm_up, niceness, *warm_up_arguments)
         self._environment = dict(environment)
-        self._log_level, self._niceness = log_level, niceness
+        self._log_level = log_level
 
     def submit(
         self,
@@ -100,18 +100,14 @@ class LocalExecutor(SlotExecutor["_Worker"]):
         return execution
 
     def _new_worker(self) -> _Worker:
-        return _Worker(self._log_level, self._niceness, self._warm_up, self._environment)
+        return _Worker(self._log_level, self._warm_up, self._environment)
 
 
 class _Worker:
     """A worker process as its parent sees it: pool, progress pipe, control block."""
 
     def __init__(
-        self,
-        log_level: str | None,
-        niceness: int,
-        warm_up: Callable[[], int],
-        environment: Mapping[str, str],
+        self, log_level: str | None, warm_up: Callable[[], int], environment: Mapping[str, str]
     ) -> None:
         self._warm_up, self._environment = warm_up, environment
         context = multiprocessing.get_context("spawn")
@@ -119,7 +115,7 @@ class _Worker:
         self.control: MutableSequence[float] = cast(
             "MutableSequence[float]", context.RawArray(ctypes.c_double, new_control())
         )
-        initialize = partial(worker.initialize, self._their_end, self.control, log_level, niceness)
+        initialize = partial(worker.initialize, self._their_end, self.control, log_level)
         self.pool = ProcessPoolExecutor(1, mp_context=context, initializer=initialize)
         self.pid: int | None = None
         self.gone = asyncio.Event()

@@ -47,7 +47,7 @@ class RayWorker:
 
     def warm_up(self, hook: str | None, *arguments: Any) -> None:
         """Run the hook that makes the first piece of work as quick as the later ones."""
-        worker.warm_up(hook, *arguments)
+        worker.warm_up(hook, 0, *arguments)
 
     def stay(self) -> None:
         """Never return: whoever waits for it learns that this process has died."""

@@ -109,9 +109,7 @@ class _Equipment:
 _equipment: list[_Equipment] = []
 
 
-def initialize(
-    pipe: Connection, control: MutableSequence[float], log_level: str | None = None, niceness: int = 0
-) -> None:
+def initialize(pipe: Connection, control: MutableSequence[float], log_level: str | None = None) -> None:
     """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
 
     Parameters
@@ -122,10 +120,7 @@ def initialize(
         Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
     log_level
         What is logged at least; None: as Python does it by itself.
-    niceness
-        By how much it leaves the cores to others, as the system counts it.
     """
-    os.nice(niceness)
     if log_level is not None:
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -141,13 +136,27 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
-def warm_up(hook: str | None, *arguments: Any) -> int:
-    """Run the hook that makes the first piece of work as quick as the later ones; return the process id."""
+def warm_up(hook: str | None, niceness: int, *arguments: Any) -> int:
+    """Make the first piece of work as quick as the later ones.
+
+    Parameters
+    ----------
+    hook, arguments
+        What does so, and what it gets.
+    niceness
+        By how much the work that comes leaves the cores to others, as the system counts it.
+
+    Returns
+    -------
+    int
+        The process id.
+    """
     if hook is not None:
         resolve(hook)(*arguments)
     # What is there now stays: to look through it for garbage would only hold up somebody's work.
     gc.collect()
     gc.freeze()
+    os.nice(niceness)
     return os.getpid()
 
 
