@@ -26,6 +26,6 @@ def random_streams(seed: int) -> RandomStreams:
     seed
         0 or more.
     """
-    initialisation, exploration, replay = seed_sequence(seed, 0).spawn(3)
+    initialisation, exploration, replay = seed_sequence(seed).spawn(3)
     generator = torch.Generator().manual_seed(int(initialisation.generate_state(1, np.uint64)[0]))
     return RandomStreams(generator, np.random.default_rng(exploration), np.random.default_rng(replay))

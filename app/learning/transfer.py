@@ -148,7 +148,7 @@ def _fine_tune_and_polish(
         arrays,
         best,
         used.polish_moves,
-        np.random.default_rng(seed_sequence(seed, 0)),
+        np.random.default_rng(seed_sequence(seed)),
         stop,
         lambda done: report(Progress(share + (1 - share) * done, epochs, best.reward, best.plan)),
     )

@@ -15,8 +15,8 @@ def seed_sequence(seed: int, *purpose: int) -> np.random.SeedSequence:
     seed
         Of the request, 0 or more.
     purpose
-        Numbers that keep streams of the same seed apart. The genetic algorithm has none; searches and
-        learners have 0, the search with planned unloading 0 and 1.
+        Numbers that keep streams of the same seed apart, the last of them not 0. Algorithms have none; the
+        search with planned unloading, which follows one, has 0 and 1.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class UniversalScratch:
         self._arrays = compile_problem(problem)
         self._best = BestPlan(self._arrays)
         self._history = History()
-        initial, episodes = seed_sequence(seed, 0).spawn(2)
+        initial, episodes = seed_sequence(seed).spawn(2)
         policy = UniversalPolicy.of_seed(self._config, int(initial.generate_state(1)[0]))
         self._tuning = FineTuning(
             policy,

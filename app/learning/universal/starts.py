@@ -47,7 +47,7 @@ def policy_starts(
     source = SourcePolicies(library_url).shortlist(problem)[0]
     if not isinstance(source.network, UniversalPolicy):
         return None
-    rng = np.random.default_rng(seed_sequence(seed, 0))
+    rng = np.random.default_rng(seed_sequence(seed))
     orders = some_orders(effort(arrays).orders, problem.n_uavs, rng)
     with one_thread():
         return play_in_orders(source.network.agent, arrays, orders, stop=stop), source.policy

@@ -89,7 +89,7 @@ class UniversalTransfer:
         self._best = BestPlan(self._arrays)
         self._recombination = Recombination(self._arrays, self._best)
         self._history = History()
-        root = seed_sequence(seed, 0)
+        root = seed_sequence(seed)
         streams = map(np.random.default_rng, root.spawn(5))
         self._sampling, self._tuning, self._polishing, ordering, self._replanning = streams
         self._orders = some_orders(self._used.orders, problem.n_uavs, ordering)

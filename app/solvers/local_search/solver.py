@@ -66,7 +66,7 @@ def search_on(
     spare = 0 if math.isinf(stop.seconds_left()) else context.spare_threads()
     stops = [stop] * context.threads
     stops += [WhileSpare(stop, context.spare_threads, place) for place in range(1, spare + 1)]
-    streams = seed_sequence(seed, 0).spawn(len(stops))
+    streams = seed_sequence(seed).spawn(len(stops))
     searches = [search, *(replica(search) for _ in stops[1:])]
     generators = [np.random.default_rng(stream) for stream in streams]
     improve_together(searches, generators, stops, moves, rounds, Cooling(), watch)
