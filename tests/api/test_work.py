@@ -50,7 +50,7 @@ def test_result_is_json_and_progress_ends_at_its_plan():
     told = []
     context = WorkContext.in_process(told.append)
 
-    done = work.allocate(payload("qmix", QMIX), context)
+    done = work.allocate(payload("qmix", QMIX) | {"keep_checkpoint": True}, context)
 
     assert json.loads(json.dumps(done.result, allow_nan=False)) == json.loads(json.dumps(done.result))
     assert done.artifact
