@@ -70,7 +70,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     report = _report(context, algorithm, known)
     solution = solver.solve(problem, payload["seed"], limit.searching, report)
     limit.searched(algorithm)
-    return _result(problem, Found(solution, algorithm).or_better(problem, known), payload, limit)
+    found = Found(solution, solution.answered_by or algorithm).or_better(problem, known)
+    return _result(problem, found, payload, limit)
 
 
 def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResult:
