@@ -132,7 +132,7 @@ def test_refusals_stand_at_their_fields(ready):
     start(page, "ga", limit="-1")
     place = page.locator("[data-pointer='/time_limit_s']")
     expect(place.locator("input")).to_have_attribute("aria-invalid", "true")
-    expect(place.locator(".error")).to_contain_text("greater than 0")
+    expect(place.locator(".error")).to_contain_text("more than 0")
 
     page.fill("input[name=time_limit_s]", "1")
     page.locator("#parameters").evaluate("details => { details.open = true; }")
