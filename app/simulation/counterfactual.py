@@ -11,8 +11,8 @@ from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.insertion import MADE, Trial, gain_of_visit, gets_more
-from app.simulation.planned_insertion import MORE, SOME_KEPT, PlannedTrial, gain_of_planned_visit
+from app.simulation.insertion import HELPS, MADE, Trial, gain_of_visit
+from app.simulation.planned_insertion import PlannedTrial, gain_of_planned_visit
 
 NO_VISIT = -1
 """In place of a place in a route: nothing is inserted."""
@@ -88,11 +88,10 @@ class Counterfactuals:
         arrays, plan, trial = self._arrays, self._plan, self._trial
         if self._planned is None:
             gain = float(gain_of_visit(arrays, plan, trial, i, place, j, reloaded))
-            more = bool(gets_more(plan, trial, j))
         else:
             gain = float(gain_of_planned_visit(arrays, plan, trial, self._planned, i, place, j, True))
-            more = bool(self._planned.known[SOME_KEPT, MORE])
-        return Outcome(gain, more and (place == NO_VISIT or bool(trial.tally[MADE])))
+        made = place == NO_VISIT or bool(trial.tally[MADE])
+        return Outcome(gain, made and bool(trial.tally[HELPS]))
 
 
 def relaxation_for(

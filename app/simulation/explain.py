@@ -94,7 +94,7 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
-        unmet=unmet_targets(problem, arrays, actions, delivered, hurry),
+        unmet=unmet_targets(problem, arrays, actions, delivered, episodes.need[0], hurry),
     )
 
 

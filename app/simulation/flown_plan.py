@@ -10,9 +10,6 @@ from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.unloading import Visits, visits_of
 
-CRUMB = 1e-9
-"""Share of a load or need below which what is left of it is rounding."""
-
 
 class FlownPlan(NamedTuple):
     """The record of a legal plan of one problem; L is the length of its longest route.
@@ -32,11 +29,9 @@ class FlownPlan(NamedTuple):
     back
         (M,) legs home.
     remaining
-        (N, K) what is still needed at the end, without what is only rounding.
-    end_need
-        (N, K) the same as the simulator has it.
+        (N, K) what is still needed at the end.
     spare
-        (M, K) what is aboard at the end, without what is only rounding; nothing for a returning UAV.
+        (M, K) what is aboard at the end.
     """
 
     visits: Visits
@@ -48,7 +43,6 @@ class FlownPlan(NamedTuple):
     leg: Floats
     back: Floats
     remaining: Floats
-    end_need: Floats
     spare: Floats
 
 
@@ -77,14 +71,10 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
         np.zeros((m, steps)),
         np.zeros((m, steps)),
         np.zeros(m),
-        np.zeros((n, k)),
         episodes.need[0],
-        np.zeros((m, k)),
+        episodes.load[0],
     )
     _fly(arrays, episodes, plan, delivered, planned)
-    plan.remaining[:] = np.where(episodes.need[0] > CRUMB * arrays.need[0], episodes.need[0], 0.0)
-    left = np.where(episodes.load[0] > CRUMB * arrays.load[0], episodes.load[0], 0.0)
-    plan.spare[~arrays.ret[0]] = left[~arrays.ret[0]]
     return plan
 
 

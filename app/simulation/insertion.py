@@ -8,23 +8,34 @@ differently.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from app.domain.problem import ROUNDING
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.flown_plan import CRUMB, FlownPlan
+from app.simulation.compilation import njit
+from app.simulation.flown_plan import FlownPlan
 from app.simulation.unloading import NONE
 
-MARK, QUEUED, CHANGED, WORK, MADE = range(5)
+MARK, QUEUED, CHANGED, WORK, MADE, HELPS = range(6)
 """Places in ``Trial.tally``."""
 
 GAIN, TURNOVER = range(2)
 """Places in ``Trial.total``."""
 
-ROUNDING = 1e-9
-"""Share of what an additional visit turns over below which its gain is the rounding of it."""
+_ROUNDING_OF_VALUES = 1e-6
+"""Share of two values that differ which counts as turned over: their difference has the rounding of both."""
+
+_INLINED: dict[str, Any] = {"inline": "always", "_nrt": False}
+inlined: Callable[[simulator.Function], simulator.Function] = njit(**_INLINED)
+"""For small functions, and those with one caller: they are compiled as a part of their callers.
+
+Whatever is compiled by itself takes long where all the arrays of a plan are its arguments, and once more in
+each of its callers. Functions that are not inlined take only the arrays that they need.
+"""
 
 
 class Trial(NamedTuple):
@@ -46,8 +57,8 @@ class Trial(NamedTuple):
     inserted
         (3,) UAV, place in its route, and target of the additional visit.
     tally
-        (5,) number of the trial, lengths of the lists, visits flown in all trials, and whether the additional
-        visit was legal.
+        (6,) number of the trial, lengths of the lists, visits flown in all trials, whether the additional
+        visit was legal, and whether its target gets more.
     total
         (2,) change of the reward, and the sum of the absolute values that it is made of.
     """
@@ -77,7 +88,7 @@ def new_trial(arrays: ProblemArrays, plan: FlownPlan) -> Trial:
         np.zeros(slots, np.int64),
         np.zeros(slots, np.int64),
         np.zeros(3, np.int64),
-        np.zeros(5, np.int64),
+        np.zeros(6, np.int64),
         np.zeros(2),
     )
 
@@ -95,7 +106,8 @@ def gain_of_visit(
     plan
         The plan in the problem as it is.
     trial
-        Scratch space. ``tally[MADE]`` says whether the visit was legal.
+        Scratch space. ``tally[MADE]`` says whether the visit was legal, ``tally[HELPS]`` whether the target
+        gets more.
     i, place, j
         The visit; where `place` is negative there is none, only another load.
     reloaded
@@ -106,94 +118,74 @@ def gain_of_visit(
     float
         The change; 0 where it is only rounding.
     """
-    m = plan.back.shape[0]
+    m, episodes, tally, total = plan.back.shape[0], trial.episodes, trial.tally, trial.total
+    visits, end = plan.visits, arrays.max_steps[0]
     begin(trial, i, place, j)
+    mark = tally[MARK]
     first = 0 if reloaded else place
     take_up(plan, trial, i, first)
     if reloaded:
         for k in range(plan.load.shape[2]):
-            trial.episodes.load[0, i, k] = arrays.load[0, i, k]
+            episodes.load[0, i, k] = arrays.load[0, i, k]
     _change(trial, i, first)
-    _push(trial, first * m + i)
-    while trial.tally[QUEUED] > 0:
-        slot = _pop(trial)
-        trial.tally[WORK] += 1
-        h = slot % m
-        if trial.uav_mark[h] != trial.tally[MARK]:
-            _fly_unchanged(arrays, plan, trial, slot // m, h)
-        else:
-            _fly_changed(arrays, plan, trial, slot // m, h)
-    if arrays.charge_return[0]:
-        for c in range(trial.tally[CHANGED]):
-            h = trial.changed[c]
-            charge(trial, -arrays.weight[0] * simulator.leg_home(arrays, trial.episodes, 0, h))
-            charge(trial, arrays.weight[0] * plan.back[h])
-    return gain(trial)
-
-
-@simulator.compiled
-def begin(trial: Trial, i: int, place: int, j: int) -> None:
-    """Begin another trial: nothing is changed yet."""
-    trial.tally[MARK] += 1
-    trial.tally[QUEUED], trial.tally[CHANGED], trial.tally[MADE] = 0, 0, 0
-    trial.inserted[0], trial.inserted[1], trial.inserted[2] = i, place, j
-    trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
-
-
-@simulator.compiled
-def charge(trial: Trial, change: float) -> None:
-    """Add a change of the reward."""
-    trial.total[GAIN] += change
-    trial.total[TURNOVER] += abs(change)
-
-
-@simulator.compiled
-def gain(trial: Trial) -> float:
-    """Change of the reward in all; 0 where it is only rounding."""
-    if abs(trial.total[GAIN]) <= ROUNDING * trial.total[TURNOVER]:
-        return 0.0
-    change: float = trial.total[GAIN]
-    return change
-
-
-@simulator.compiled
-def move_to(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
-    """Put UAV `i` where it is in the plan before its visit `place`."""
-    episodes = trial.episodes
-    episodes.at[0, i] = simulator.START if place == 0 else plan.visits.target[i, place - 1]
-    episodes.flown[0, i], episodes.clock[0, i] = plan.flown[i, place], plan.clock[i, place]
-    episodes.ret[0, i] = False
-
-
-@simulator.compiled
-def take_up(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
-    """Put UAV `i` where it is in the plan before its visit `place`, with what it has then."""
-    move_to(plan, trial, i, place)
-    for k in range(plan.load.shape[2]):
-        trial.episodes.load[0, i, k] = plan.load[i, place, k]
-
-
-@simulator.compiled
-def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
-    """Give target `j` the need that it has in the plan just before a slot, unless the trial has changed it.
-
-    Returns
-    -------
-    bool
-        Whether it is unchanged, and has no visits in the plan from the slot on.
-    """
-    if trial.target_mark[j] == trial.tally[MARK]:
-        return False
-    m = plan.back.shape[0]
-    later = plan.visits.first[j]
-    while later != NONE and later < slot:
-        later = plan.visits.following[later]
-    for k in range(plan.need.shape[2]):
-        if later == NONE:
-            trial.episodes.need[0, j, k] = plan.end_need[j, k]
-        else:
-            trial.episodes.need[0, j, k] = plan.need[later % m, later // m, k]
-    return bool(later == NONE)
+    _push(trial.queue, trial.queue_mark, tally, first * m + i)
+    while tally[QUEUED] > 0:
+        slot = _pop(trial.queue, tally)
+        tally[WORK] += 1
+        s, h, settled = slot // m, slot % m, False
+        if trial.uav_mark[h] != mark:
+            # As it was until now, but the need of the target that it visits has changed.
+            x = visits.target[h, s]
+            take_up(plan, trial, h, s)
+            if simulator.verdict(arrays, episodes, 0, h, x) == simulator.ALLOWED:
+                exchange(total, plan.value[h, s], simulator.act(arrays, episodes, 0, h, x))
+                same = True
+                for k in range(plan.load.shape[2]):
+                    same = same and episodes.load[0, h, k] == plan.load[h, s + 1, k]
+                if same:
+                    continue
+                settled = True
+            _change(trial, h, s + 1 if settled else s)
+        length = visits.length[h] + (1 if h == i and place >= 0 else 0)
+        if not settled:
+            if s < visits.length[h]:
+                # What the plan has here is not done, or not as it was.
+                x = visits.target[h, s]
+                need_at(plan, trial, x, slot)
+                _open(visits.first, visits.following, trial, x, slot)
+            while s < end and trial.cursor[h] < length and not settled:
+                q = _place_in_plan(trial, h, trial.cursor[h])
+                trial.cursor[h] += 1
+                x = j if q == NONE else visits.target[h, q]
+                before = 0.0 if q == NONE else plan.value[h, q]
+                need_at(plan, trial, x, slot)
+                if simulator.verdict(arrays, episodes, 0, h, x) == simulator.ALLOWED:
+                    exchange(total, before, simulator.act(arrays, episodes, 0, h, x))
+                    _open(visits.first, visits.following, trial, x, slot)
+                    if q == NONE:
+                        tally[MADE] = 1
+                    settled = True
+                else:
+                    charge(total, -before)
+        if (s + 1 < end and trial.cursor[h] < length) or s + 1 < visits.length[h]:
+            _push(trial.queue, trial.queue_mark, tally, slot + m)
+    for c in range(tally[CHANGED]):
+        h = trial.changed[c]
+        length = visits.length[h] + (1 if h == i and place >= 0 else 0)
+        for cursor in range(trial.cursor[h], length):
+            q = _place_in_plan(trial, h, cursor)
+            if q != NONE:
+                charge(total, -plan.value[h, q])
+        if arrays.charge_return[0]:
+            back = simulator.leg_home(arrays, episodes, 0, h)
+            exchange(total, -arrays.weight[0] * plan.back[h], -arrays.weight[0] * back)
+    if trial.target_mark[j] == mark:
+        lacked, lacks = 0.0, 0.0
+        for k in range(plan.load.shape[2]):
+            lacked += plan.remaining[j, k]
+            lacks += episodes.need[0, j, k]
+        tally[HELPS] = 1 if lacks < lacked * (1.0 - ROUNDING) else 0
+    return gain(total)
 
 
 @simulator.compiled
@@ -204,101 +196,120 @@ def gain_of_undisturbed_visit(
 
     The UAV and the target are as they are in the plan at that place.
     """
-    weight = arrays.weight[0]
+    weight, total = arrays.weight[0], trial.total
     trial.tally[MADE] = 1
-    charge(trial, simulator.act(arrays, trial.episodes, 0, i, j))
+    charge(total, simulator.act(arrays, trial.episodes, 0, i, j))
     if place < plan.visits.length[i]:
-        charge(trial, weight * plan.leg[i, place])
-        charge(trial, -weight * arrays.between[0, j, plan.visits.target[i, place]])
+        leg = arrays.between[0, j, plan.visits.target[i, place]]
+        exchange(total, -weight * plan.leg[i, place], -weight * leg)
     elif arrays.charge_return[0]:
-        charge(trial, weight * plan.back[i])
-        charge(trial, -weight * simulator.leg_home(arrays, trial.episodes, 0, i))
-    return gain(trial)
+        back = simulator.leg_home(arrays, trial.episodes, 0, i)
+        exchange(total, -weight * plan.back[i], -weight * back)
+    return gain(total)
+
+
+@inlined
+def is_undisturbed(plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
+    """Whether a visit after which all others are legal changes nothing but the way of its UAV.
+
+    The UAV and the target are as they are in the plan at that place, and the plan does not visit it any
+    more. The UAV has enough for its later visits, and nobody comes in between where they are a step later.
+    """
+    m, length, undisturbed = plan.back.shape[0], plan.visits.length[i], True
+    if place < length:
+        for k in range(plan.load.shape[2]):
+            taken = min(plan.load[i, place, k], trial.episodes.need[0, j, k])
+            undisturbed = undisturbed and taken <= plan.load[i, length, k]
+        for s in range(place, length):
+            following = plan.visits.following[s * m + i]
+            undisturbed = undisturbed and (following == NONE or following > (s + 1) * m + i)
+    return undisturbed
+
+
+@inlined
+def begin(trial: Trial, i: int, place: int, j: int) -> None:
+    """Begin another trial: nothing is changed yet."""
+    trial.tally[MARK] += 1
+    trial.tally[QUEUED], trial.tally[CHANGED] = 0, 0
+    trial.tally[MADE], trial.tally[HELPS] = 0, 0
+    trial.inserted[0], trial.inserted[1], trial.inserted[2] = i, place, j
+    trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
 
 
 @simulator.compiled
-def gets_more(plan: FlownPlan, trial: Trial, j: int) -> bool:
-    """Whether target `j` lacks less after the trial than in the plan."""
-    if trial.target_mark[j] != trial.tally[MARK]:
-        return False
-    before, after = 0.0, 0.0
-    for k in range(plan.need.shape[2]):
-        before += plan.end_need[j, k]
-        after += trial.episodes.need[0, j, k]
-    return after < before * (1.0 - CRUMB)
+def charge(total: Floats, change: float) -> None:
+    """Add a change of the reward."""
+    total[GAIN] += change
+    total[TURNOVER] += abs(change)
 
 
 @simulator.compiled
-def _fly_unchanged(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, s: int, h: int) -> None:
-    """Fly a visit to a target whose need has changed, by a UAV that is as it was until now."""
-    j = plan.visits.target[h, s]
-    take_up(plan, trial, h, s)
-    if simulator.verdict(arrays, trial.episodes, 0, h, j) != simulator.ALLOWED:
-        _change(trial, h, s)
-        _fly_changed(arrays, plan, trial, s, h)
-        return
-    value = simulator.act(arrays, trial.episodes, 0, h, j)
-    if value != plan.value[h, s]:
-        charge(trial, value)
-        charge(trial, -plan.value[h, s])
+def exchange(total: Floats, before: float, after: float) -> None:
+    """Put one value in the place of another."""
+    if after != before:
+        total[GAIN] += after - before
+        total[TURNOVER] += abs(after - before) + _ROUNDING_OF_VALUES * (abs(before) + abs(after))
+
+
+@simulator.compiled
+def gain(total: Floats) -> float:
+    """Change of the reward in all; 0 where it is only the rounding of what is turned over."""
+    change: float = total[GAIN]
+    return 0.0 if abs(change) <= ROUNDING * total[TURNOVER] else change
+
+
+@inlined
+def move_to(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
+    """Put UAV `i` where it is in the plan before its visit `place`."""
+    trial.episodes.at[0, i] = simulator.START if place == 0 else plan.visits.target[i, place - 1]
+    trial.episodes.flown[0, i] = plan.flown[i, place]
+    trial.episodes.clock[0, i] = plan.clock[i, place]
+    trial.episodes.ret[0, i] = False
+
+
+@inlined
+def take_up(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
+    """Put UAV `i` where it is in the plan before its visit `place`, with what it has then."""
+    move_to(plan, trial, i, place)
     for k in range(plan.load.shape[2]):
-        if trial.episodes.load[0, h, k] != plan.load[h, s + 1, k]:
-            _change(trial, h, s + 1)
-            _push_next(arrays, plan, trial, s, h)
-            return
+        trial.episodes.load[0, i, k] = plan.load[i, place, k]
 
 
-@simulator.compiled
-def _fly_changed(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, s: int, h: int) -> None:
-    """Take back what a changed UAV does in the plan in step `s`, and let it fly its next legal visit."""
-    m, episodes = plan.back.shape[0], trial.episodes
-    slot = s * m + h
-    if s < plan.visits.length[h]:
-        j = plan.visits.target[h, s]
-        need_at(plan, trial, j, slot)
-        _open(plan, trial, j, slot)
-        charge(trial, -plan.value[h, s])
-    while s < arrays.max_steps[0] and trial.cursor[h] < route_length(plan, trial, h):
-        place = trial.cursor[h]
-        j = route_target(plan, trial, h, place)
-        trial.cursor[h] += 1
-        need_at(plan, trial, j, slot)
-        if simulator.verdict(arrays, episodes, 0, h, j) == simulator.ALLOWED:
-            charge(trial, simulator.act(arrays, episodes, 0, h, j))
-            _open(plan, trial, j, slot)
-            if h == trial.inserted[0] and place == trial.inserted[1]:
-                trial.tally[MADE] = 1
-            break
-    _push_next(arrays, plan, trial, s, h)
+@inlined
+def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
+    """Give target `j` the need that it has in the plan just before a slot, unless the trial has changed it.
+
+    Returns
+    -------
+    bool
+        Whether it is unchanged, and has no visits in the plan from the slot on.
+    """
+    alone = False
+    if trial.target_mark[j] != trial.tally[MARK]:
+        m = plan.back.shape[0]
+        later = plan.visits.first[j]
+        while later != NONE and later < slot:
+            later = plan.visits.following[later]
+        alone = bool(later == NONE)
+        for k in range(plan.need.shape[2]):
+            if alone:
+                trial.episodes.need[0, j, k] = plan.remaining[j, k]
+            else:
+                trial.episodes.need[0, j, k] = plan.need[later % m, later // m, k]
+    return alone
 
 
-@simulator.compiled
-def _push_next(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, s: int, h: int) -> None:
-    """Queue the next step of a changed UAV, if it or the plan does anything in it."""
-    m = plan.back.shape[0]
-    flies = s + 1 < arrays.max_steps[0] and trial.cursor[h] < route_length(plan, trial, h)
-    if flies or s + 1 < plan.visits.length[h]:
-        _push(trial, (s + 1) * m + h)
+@inlined
+def _place_in_plan(trial: Trial, h: int, cursor: int) -> int:
+    """Which visit of the plan a visit of a UAV's route is; NONE for the additional one."""
+    place = trial.inserted[1]
+    q = cursor
+    if h == trial.inserted[0] and place >= 0 and cursor >= place:
+        q = NONE if cursor == place else cursor - 1
+    return q
 
 
-@simulator.compiled
-def route_length(plan: FlownPlan, trial: Trial, h: int) -> int:
-    """How many visits a UAV's route has, with the additional one."""
-    extra = 1 if h == trial.inserted[0] and trial.inserted[1] >= 0 else 0
-    return int(plan.visits.length[h]) + extra
-
-
-@simulator.compiled
-def route_target(plan: FlownPlan, trial: Trial, h: int, place: int) -> int:
-    """The target of a visit of a UAV's route with the additional one."""
-    if h != trial.inserted[0] or trial.inserted[1] < 0 or place < trial.inserted[1]:
-        return int(plan.visits.target[h, place])
-    if place == trial.inserted[1]:
-        return int(trial.inserted[2])
-    return int(plan.visits.target[h, place - 1])
-
-
-@simulator.compiled
+@inlined
 def _change(trial: Trial, h: int, cursor: int) -> None:
     """Let a UAV go its own way from now on."""
     trial.uav_mark[h] = trial.tally[MARK]
@@ -307,49 +318,48 @@ def _change(trial: Trial, h: int, cursor: int) -> None:
     trial.tally[CHANGED] += 1
 
 
-@simulator.compiled
-def _open(plan: FlownPlan, trial: Trial, j: int, slot: int) -> None:
+@inlined
+def _open(first: Integers, following: Integers, trial: Trial, j: int, slot: int) -> None:
     """Let a target have its own need from now on: the plan's later visits to it are flown again."""
-    if trial.target_mark[j] == trial.tally[MARK]:
-        return
-    trial.target_mark[j] = trial.tally[MARK]
-    later = plan.visits.first[j]
-    while later != NONE:
-        if later > slot:
-            _push(trial, later)
-        later = plan.visits.following[later]
+    if trial.target_mark[j] != trial.tally[MARK]:
+        trial.target_mark[j] = trial.tally[MARK]
+        later = first[j]
+        while later != NONE:
+            if later > slot:
+                _push(trial.queue, trial.queue_mark, trial.tally, later)
+            later = following[later]
 
 
 @simulator.compiled
-def _push(trial: Trial, slot: int) -> None:
+def _push(queue: Integers, queue_mark: Integers, tally: Integers, slot: int) -> None:
     """Queue a slot, once."""
-    if trial.queue_mark[slot] == trial.tally[MARK]:
+    if queue_mark[slot] == tally[MARK]:
         return
-    trial.queue_mark[slot] = trial.tally[MARK]
-    hole = trial.tally[QUEUED]
-    trial.tally[QUEUED] += 1
-    while hole > 0 and trial.queue[(hole - 1) // 2] > slot:
-        trial.queue[hole] = trial.queue[(hole - 1) // 2]
+    queue_mark[slot] = tally[MARK]
+    hole = tally[QUEUED]
+    tally[QUEUED] += 1
+    while hole > 0 and queue[(hole - 1) // 2] > slot:
+        queue[hole] = queue[(hole - 1) // 2]
         hole = (hole - 1) // 2
-    trial.queue[hole] = slot
+    queue[hole] = slot
 
 
 @simulator.compiled
-def _pop(trial: Trial) -> int:
+def _pop(queue: Integers, tally: Integers) -> int:
     """Take the earliest slot out of the queue."""
-    slot = int(trial.queue[0])
-    trial.tally[QUEUED] -= 1
-    size = trial.tally[QUEUED]
-    last, hole = trial.queue[size], 0
+    slot = int(queue[0])
+    tally[QUEUED] -= 1
+    size = tally[QUEUED]
+    last, hole = queue[size], 0
     while True:
         child = 2 * hole + 1
         if child >= size:
             break
-        if child + 1 < size and trial.queue[child + 1] < trial.queue[child]:
+        if child + 1 < size and queue[child + 1] < queue[child]:
             child += 1
-        if trial.queue[child] >= last:
+        if queue[child] >= last:
             break
-        trial.queue[hole] = trial.queue[child]
+        queue[hole] = queue[child]
         hole = child
-    trial.queue[hole] = last
+    queue[hole] = last
     return slot

@@ -21,14 +21,16 @@ from app.simulation.insertion import (
     begin,
     gain_of_undisturbed_visit,
     gain_of_visit,
+    inlined,
+    is_undisturbed,
     move_to,
     need_at,
     take_up,
 )
-from app.simulation.planned_insertion import PlannedTrial, gain_of_planned_visit, look_at_all_kept
+from app.simulation.planned_insertion import ADDS, ALL_KEPT, ONLY_LOOK, PlannedTrial, gain_of_planned_visit
 from app.simulation.shortfalls import RANGE, STEP, TIME, detour, is_late, lacking
 
-_WORK = 700_000
+_WORK = 2_000_000
 """Visits flown for all areas of an answer: some tenths of a second. Beyond, no more are looked at."""
 
 _PIECE = 40_000
@@ -122,13 +124,15 @@ class Lookout:
             voyage=arrays.voyage.copy(), deadline=arrays.deadline.copy(), max_steps=arrays.max_steps.copy()
         )
         self._plan, self._trial, self._planned, self._hurry = plan, trial, planned, hurry
+        # A visit with many materials takes longer.
+        self._size = 1 + arrays.shape[2] / 16
         room = plan.leg.shape[1] + 3
         self._lacking, self._kept = np.zeros(room), np.zeros(room)
 
     @property
     def spent(self) -> bool:
         """Whether this answer has had its share of looking, however much time there is."""
-        return int(self._trial.tally[WORK]) >= _WORK
+        return int(self._trial.tally[WORK]) >= _WORK / self._size
 
     def look(self, j: int, start: Start) -> Places | None:
         """Look at all places for a visit to target `j`; None if that cannot be finished."""
@@ -167,18 +171,16 @@ class Lookout:
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
 
 
-@simulator.compiled
+@inlined
 def _carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
     """Whether a UAV can be sent and carries, at first, something that a target still needs at the end."""
-    if arrays.ret[0, i]:
-        return False
+    useful = False
     for k in range(plan.remaining.shape[1]):
-        if arrays.load[0, i, k] > 0.0 and plan.remaining[j, k] > 0.0:
-            return True
-    return False
+        useful = useful or (arrays.load[0, i, k] > 0.0 and plan.remaining[j, k] > 0.0)
+    return bool(useful and not arrays.ret[0, i])
 
 
-@simulator.compiled
+@inlined
 def _missing(arrays: ProblemArrays, i: int, j: int) -> float:
     """Range that a UAV lacks to fly to a target directly; negative where it has more than that."""
     reach: float = arrays.dis[0, i] + arrays.start_target[0, i, j]
@@ -199,21 +201,21 @@ def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, 
             missing = _missing(arrays, i, j)
             if missing < start.missing[j]:
                 start.missing[j], start.carrier[j] = missing, i
-            if missing <= arrays.voyage[0, i] * simulator.TOLERANCE:
+            if arrays.voyage[0, i] + missing <= simulator.farthest(arrays.voyage[0, i]):
                 late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
                 if start.fastest[j] < 0 or late < start.late[j]:
                     start.late[j], start.fastest[j] = late, i
 
 
-@simulator.compiled
+@inlined
 def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) -> bool:
     """Whether a UAV counts among those that could come: carriers, those in range, or those in time too."""
-    if not _carries(arrays, plan, i, j):
-        return False
-    if comers >= _IN_RANGE and _missing(arrays, i, j) > arrays.voyage[0, i] * simulator.TOLERANCE:
-        return False
+    voyage = arrays.voyage[0, i]
+    in_range = voyage + _missing(arrays, i, j) <= simulator.farthest(voyage)
     late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
-    return not (comers >= _IN_TIME and is_late(late, arrays.deadline[0, j]))
+    in_time = not is_late(late, arrays.deadline[0, j])
+    near = (comers < _IN_RANGE or in_range) and (comers < _IN_TIME or in_time)
+    return near and _carries(arrays, plan, i, j)
 
 
 @simulator.compiled
@@ -245,7 +247,8 @@ def _look(
             for k in range(plan.spare.shape[1]):
                 left_over = left_over or (plan.spare[i, k] > 0.0 and plan.remaining[j, k] > 0.0)
             if planned is not None:
-                left_over = left_over or look_at_all_kept(arrays, plan, trial, planned, i, j)
+                gain_of_planned_visit(arrays, plan, trial, planned, i, ONLY_LOOK, j, False)
+                left_over = left_over or planned.known[ALL_KEPT, ADDS] == 1
         if left_over:
             found.left_over[0] = 1
         for place in range(plan.visits.length[i] + 1):
@@ -280,7 +283,7 @@ def _look(
     return int(plan.back.shape[0])
 
 
-@simulator.compiled
+@inlined
 def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
     """Give a UAV range and its visits time and a step without limit; what they had is kept."""
     length = plan.visits.length[i]
@@ -292,7 +295,7 @@ def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) 
     arrays.max_steps[0] += 1
 
 
-@simulator.compiled
+@inlined
 def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
     """Undo :func:`_ease`: backwards, as a target may be visited twice."""
     length = plan.visits.length[i]
@@ -302,21 +305,22 @@ def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: 
     arrays.voyage[0, i], arrays.deadline[0, j] = kept[0], kept[1]
 
 
-@simulator.compiled
+@inlined
 def _is_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
     """Whether a visit is legal, where unloading is greedy."""
-    if place >= arrays.max_steps[0]:
-        return False
     begin(trial, i, place, j)
-    move_to(plan, trial, i, place)
-    if simulator.reach_verdict(arrays, trial.episodes, 0, i, j) != simulator.ALLOWED:
-        return False
-    take_up(plan, trial, i, place)
-    need_at(plan, trial, j, place * plan.back.shape[0] + i)
-    return simulator.verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+    legal = bool(place < arrays.max_steps[0])
+    if legal:
+        move_to(plan, trial, i, place)
+        legal = simulator.reach_verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+    if legal:
+        take_up(plan, trial, i, place)
+        need_at(plan, trial, j, place * plan.back.shape[0] + i)
+        legal = simulator.verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+    return legal
 
 
-@simulator.compiled
+@inlined
 def _greedy_gain(
     arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int, keeps_all: bool
 ) -> float:
@@ -324,24 +328,21 @@ def _greedy_gain(
     begin(trial, i, place, j)
     take_up(plan, trial, i, place)
     alone = need_at(plan, trial, j, place * plan.back.shape[0] + i) and keeps_all
-    length = plan.visits.length[i]
-    if alone and place < length:
-        for k in range(plan.load.shape[2]):
-            taken = min(plan.load[i, place, k], trial.episodes.need[0, j, k])
-            alone = alone and taken <= plan.load[i, length, k]
-    if alone:
-        return gain_of_undisturbed_visit(arrays, plan, trial, i, place, j)
-    return gain_of_visit(arrays, plan, trial, i, place, j, False)
+    if alone and is_undisturbed(plan, trial, i, place, j):
+        gain = gain_of_undisturbed_visit(arrays, plan, trial, i, place, j)
+    else:
+        gain = gain_of_visit(arrays, plan, trial, i, place, j, False)
+    return gain
 
 
-@simulator.compiled
+@inlined
 def _note(found: Places, which: int, i: int, place: int, gain: float) -> None:
     """Keep a visit if it is the best of its kind."""
     if found.uav[which] < 0 or gain > found.gain[which]:
         found.uav[which], found.place[which], found.gain[which] = i, place, gain
 
 
-@simulator.compiled
+@inlined
 def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
     """What a visit would earn that brings all that is still needed and takes nothing from others."""
     still = 0.0
@@ -352,7 +353,7 @@ def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) ->
     return hope
 
 
-@simulator.compiled
+@inlined
 def _note_loader(found: Places, i: int, place: int, hope: float, lack: int) -> None:
     """Keep a visit with more aboard if there is more to hope from it."""
     which = 0 if lack == 0 else 1

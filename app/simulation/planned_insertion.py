@@ -14,22 +14,28 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation import simulator
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.flown_plan import CRUMB, FlownPlan
+from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     CHANGED,
     GAIN,
+    HELPS,
     MADE,
-    MARK,
     TURNOVER,
     WORK,
     Trial,
     begin,
     charge,
+    exchange,
     gain,
+    inlined,
 )
 from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve, visits_of
+from app.simulation.visit_lists import connected, move_slot
 
-UAV, TARGET, UNLOADS, ADDS, MORE = range(5)
+ONLY_LOOK = -2
+"""In place of a place: what the visit adds is worked out, and no more."""
+
+UAV, TARGET, UNLOADS, ADDS = range(4)
 """Places in a row of ``PlannedTrial.known``."""
 
 ALL_KEPT, SOME_KEPT = range(2)
@@ -84,7 +90,7 @@ def new_planned_trial(arrays: ProblemArrays, plan: FlownPlan, actions: Integers)
         np.zeros(steps, np.bool_),
         np.zeros((2, 2)),
         np.zeros((2, steps), np.bool_),
-        np.full((2, 5), NONE, np.int64),
+        np.full((2, 4), NONE, np.int64),
     )
 
 
@@ -104,301 +110,215 @@ def gain_of_planned_visit(
     Parameters
     ----------
     arrays, plan, i, place, j
-        As there.
+        As there; `place` may also be ONLY_LOOK, to fill row ALL_KEPT of `planned`.
     trial, planned
         Scratch space. ``trial.tally[MADE]`` says whether the visit was legal and unloads something.
     exact
-        Otherwise a visit that cannot gain may have any change that is not above 0, and every UAV has the
-        load that it has in the plan. An exact gain is in row SOME_KEPT, whether some are kept or all.
+        Otherwise a visit that cannot gain may have any change that is not above 0, and every UAV has the load
+        that it has in the plan.
     """
+    tally, total, known = trial.tally, trial.total, planned.known
     begin(trial, i, place, j)
-    whole = _keep_legal(arrays, plan, trial, planned)
-    if place >= 0 and trial.tally[MADE] == 0:
-        return 0.0
+    whole = True
+    if place != ONLY_LOOK:
+        whole = _keep_legal(arrays, plan, trial, planned)
+        if place >= 0 and tally[MADE] == 0:
+            return 0.0
     row = SOME_KEPT if exact or not whole else ALL_KEPT
-    if exact:
-        _amounts_anew(arrays, plan, trial, planned, row)
-    else:
-        look_at_all_kept(arrays, plan, trial, planned, i, j)
-        if not whole:
-            _charge_own_way(arrays, plan, trial, planned, ALL_KEPT)
-            most: float = trial.total[GAIN] + planned.change[ALL_KEPT, GAIN]
+    for wanted in range(2):
+        if wanted == ALL_KEPT and (exact or (known[ALL_KEPT, UAV] == i and known[ALL_KEPT, TARGET] == j)):
+            continue
+        if wanted == SOME_KEPT and row == ALL_KEPT:
+            continue
+        if wanted == SOME_KEPT and not exact:
+            _leave_out(plan, planned, i, ALL_KEPT)
+            _charge_way(arrays, plan.visits, plan.leg, plan.back, planned.left_out, total, i, place, j)
+            most: float = total[GAIN] + planned.change[ALL_KEPT, GAIN]
             if most <= 0.0:
                 return most
-            trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
-            _amounts_anew(arrays, plan, trial, planned, row)
-    if planned.known[row, UNLOADS] == 0:
-        trial.tally[MADE] = 0
+        _amounts_anew(arrays, plan, trial, planned, wanted)
+    if place == ONLY_LOOK:
         return 0.0
-    _charge_own_way(arrays, plan, trial, planned, row)
-    trial.total[GAIN] += planned.change[row, GAIN]
-    trial.total[TURNOVER] += planned.change[row, TURNOVER]
-    return gain(trial)
+    if known[row, UNLOADS] == 0:
+        tally[MADE] = 0
+        return 0.0
+    _leave_out(plan, planned, i, row)
+    total[GAIN], total[TURNOVER] = planned.change[row, GAIN], planned.change[row, TURNOVER]
+    _charge_way(arrays, plan.visits, plan.leg, plan.back, planned.left_out, total, i, place, j)
+    return gain(total)
 
 
-@simulator.compiled
-def look_at_all_kept(
-    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, i: int, j: int
-) -> bool:
-    """Work out what a visit adds where nothing becomes illegal by it, unless it is known already.
-
-    Returns
-    -------
-    bool
-        Whether it adds to the satisfaction.
-    """
-    known = planned.known
-    if known[ALL_KEPT, UAV] != i or known[ALL_KEPT, TARGET] != j:
-        trial.inserted[0], trial.inserted[2] = i, j
-        place, trial.inserted[1] = trial.inserted[1], 0
-        _amounts_anew(arrays, plan, trial, planned, ALL_KEPT)
-        trial.inserted[1] = place
-    return bool(known[ALL_KEPT, ADDS] == 1)
-
-
-@simulator.compiled
+@inlined
 def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial) -> bool:
     """Fly the UAV's route with the additional visit, and note what stays legal; say whether all does."""
-    whole = True
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     episodes, length = trial.episodes, plan.visits.length[i]
     episodes.at[0, i] = simulator.START
     episodes.flown[0, i], episodes.clock[0, i] = arrays.dis[0, i], 0.0
-    steps = 0
-    for s in range(length + 1):
-        if s == place and steps < arrays.max_steps[0]:
-            if simulator.reach_verdict(arrays, episodes, 0, i, j) != simulator.ALLOWED:
-                return False
-            simulator.fly_to(arrays, episodes, 0, i, j)
-            trial.tally[MADE] = 1
-            steps += 1
-        if s == length:
-            break
-        following = plan.visits.target[i, s]
+    steps, whole = 0, True
+    # Number s, then the additional visit where it comes before it.
+    for q in range(2 * length + 1):
+        s = q // 2
+        additional = q % 2 == 0
+        if additional and s != place:
+            continue
+        x = j if additional else plan.visits.target[i, s]
         trial.tally[WORK] += 1
-        planned.kept[s] = (
-            steps < arrays.max_steps[0]
-            and simulator.reach_verdict(arrays, episodes, 0, i, following) == simulator.ALLOWED
+        legal = steps < arrays.max_steps[0] and (
+            simulator.reach_verdict(arrays, episodes, 0, i, x) == simulator.ALLOWED
         )
-        if planned.kept[s]:
-            simulator.fly_to(arrays, episodes, 0, i, following)
+        if legal:
+            simulator.fly_to(arrays, episodes, 0, i, x)
             steps += 1
-        whole = whole and planned.kept[s]
+        if additional:
+            trial.tally[MADE] = 1 if legal else 0
+            if not legal:
+                break
+        else:
+            planned.kept[s] = legal
+            whole = whole and legal
     return whole
 
 
-@simulator.compiled
+@inlined
+def _leave_out(plan: FlownPlan, planned: PlannedTrial, i: int, row: int) -> None:
+    """Fill ``left_out`` for the UAV of the additional visit."""
+    for s in range(plan.visits.length[i]):
+        planned.left_out[s] = not planned.kept[s] or planned.idle[row, s]
+
+
+@inlined
 def _amounts_anew(
     arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int
 ) -> None:
     """Work out the best amounts with the additional visit, and fill a row of what is known from them."""
-    visits, unloading = planned.visits, planned.unloading
+    visits, unloading, total = planned.visits, planned.unloading, trial.total
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     m, length = plan.back.shape[0], plan.visits.length[i]
     # A visit that is given up becomes another one to the additional target, which changes nothing there.
     for s in range(length):
         if row == SOME_KEPT and not planned.kept[s]:
-            _move(visits, s * m + i, visits.target[i, s], j)
+            move_slot(visits, s * m + i, visits.target[i, s], j)
             visits.target[i, s] = j
-    if place >= 0:
+    if place != NONE:
         visits.target[i, length] = j
-        _move(visits, length * m + i, NONE, j)
+        move_slot(visits, length * m + i, NONE, j)
         visits.length[i] += 1
-    count = _connected(plan, trial, planned)
+    count = connected(
+        visits,
+        plan.visits.target,
+        unloading,
+        trial.uav_mark,
+        trial.target_mark,
+        trial.changed,
+        trial.tally,
+        i,
+        j,
+    )
     serve(arrays, visits, unloading, count)
     trial.tally[WORK] += unloading.number[2] + count
     unloading.number[2] = 0
-    _fill_row(arrays, plan, trial, planned, row, count)
-    if place >= 0:
-        visits.length[i] -= 1
-        _move(visits, length * m + i, j, NONE)
-    for s in range(length):
-        if row == SOME_KEPT and not planned.kept[s]:
-            visits.target[i, s] = plan.visits.target[i, s]
-            _move(visits, s * m + i, j, visits.target[i, s])
-
-
-@simulator.compiled
-def _fill_row(
-    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int, count: int
-) -> None:
-    """Compare the new amounts of the connected targets with the plan's."""
-    visits, unloading = planned.visits, planned.unloading
-    i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
-    m = plan.back.shape[0]
-    gained, turned = trial.total[GAIN], trial.total[TURNOVER]
-    trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
+    total[GAIN], total[TURNOVER] = 0.0, 0.0
     for q in range(count):
         x = unloading.served[q]
-        change = unloading.value[x] - planned.worth[x]
-        if abs(change) > ROUNDING * max(unloading.value[x], planned.worth[x]):
-            charge(trial, change)
-    planned.known[row, UAV], planned.known[row, TARGET] = i, j
-    planned.known[row, ADDS] = 1 if gain(trial) > 0.0 else 0
+        before, after = planned.worth[x], unloading.value[x]
+        if abs(after - before) > ROUNDING * max(before, after):
+            charge(total, after - before)
+    planned.known[row, UAV], planned.known[row, TARGET] = i if row == ALL_KEPT else NONE, j
+    planned.known[row, ADDS] = 1 if gain(total) > 0.0 else 0
     for c in range(trial.tally[CHANGED]):
         h, idle = trial.changed[c], False
         for s in range(plan.visits.length[h]):
-            planned.left_out[s] = _unloads_nothing(arrays, planned, s * m + h)
+            planned.left_out[s] = _unloads_nothing(
+                arrays.load, arrays.need, visits.target, unloading.amount, h, s
+            )
             idle = idle or planned.left_out[s]
             if h == i:
                 planned.idle[row, s] = planned.left_out[s]
         if idle and h != i:
-            _charge_way(arrays, plan, trial, planned, h, NONE, j)
-    planned.change[row, GAIN], planned.change[row, TURNOVER] = trial.total[GAIN], trial.total[TURNOVER]
-    trial.total[GAIN], trial.total[TURNOVER] = gained, turned
-    planned.known[row, UNLOADS] = 1 if place < 0 or _can_unload(arrays, planned, i, j) else 0
-    got, before = 0.0, 0.0
+            _charge_way(arrays, plan.visits, plan.leg, plan.back, planned.left_out, total, h, NONE, j)
+    planned.change[row, GAIN], planned.change[row, TURNOVER] = total[GAIN], total[TURNOVER]
+    total[GAIN], total[TURNOVER] = 0.0, 0.0
+    useful = place == NONE or _can_unload(arrays.load, arrays.need, visits, unloading.amount, i, j)
+    planned.known[row, UNLOADS] = 1 if useful else 0
+    lacks, lacked = arrays.need_total[0, j], 0.0
     slot = visits.first[j]
     while slot != NONE:
         for k in range(plan.need.shape[2]):
-            got += unloading.amount[slot, k]
+            lacks -= unloading.amount[slot, k]
         slot = visits.following[slot]
     for k in range(plan.need.shape[2]):
-        before += plan.end_need[j, k]
-    lacks = arrays.need_total[0, j] - got
-    planned.known[row, MORE] = 1 if lacks < before * (1.0 - CRUMB) else 0
+        lacked += plan.remaining[j, k]
+    trial.tally[HELPS] = 1 if lacks < lacked * (1.0 - ROUNDING) else 0
+    if place != NONE:
+        visits.length[i] -= 1
+        move_slot(visits, length * m + i, j, NONE)
+    for s in range(length):
+        if row == SOME_KEPT and not planned.kept[s]:
+            visits.target[i, s] = plan.visits.target[i, s]
+            move_slot(visits, s * m + i, j, visits.target[i, s])
 
 
 @simulator.compiled
-def _can_unload(arrays: ProblemArrays, planned: PlannedTrial, i: int, j: int) -> bool:
-    """Whether every visit of UAV `i` to target `j` can unload something.
-
-    It unloads something in all of them together, which they can share; or it has something left over, that it
-    can bring in place of another UAV.
-    """
-    visits, unloading, m = planned.visits, planned.unloading, planned.visits.length.shape[0]
-    for k in range(unloading.amount.shape[1]):
-        if arrays.load[0, i, k] <= 0.0 or arrays.need[0, j, k] <= 0.0:
-            continue
-        left = arrays.load[0, i, k]
-        for s in range(visits.length[i]):
-            left -= unloading.amount[s * m + i, k]
-            if visits.target[i, s] == j and not _unloads_nothing(arrays, planned, s * m + i):
-                return True
-        if left > CRUMB * arrays.load[0, i, k]:
-            return True
-    return False
-
-
-@simulator.compiled
-def _unloads_nothing(arrays: ProblemArrays, planned: PlannedTrial, slot: int) -> bool:
+def _unloads_nothing(load: Floats, need: Floats, target: Integers, amount: Floats, i: int, s: int) -> bool:
     """Whether what a visit unloads is nothing, or only rounding."""
-    m = planned.visits.length.shape[0]
-    i = slot % m
-    j = planned.visits.target[i, slot // m]
-    for k in range(planned.unloading.amount.shape[1]):
-        if planned.unloading.amount[slot, k] > ROUNDING * min(arrays.load[0, i, k], arrays.need[0, j, k]):
+    for k in range(amount.shape[1]):
+        if amount[s * target.shape[0] + i, k] > ROUNDING * min(load[0, i, k], need[0, target[i, s], k]):
             return False
     return True
 
 
 @simulator.compiled
-def _charge_own_way(
-    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, row: int
-) -> None:
-    """Charge the way of the UAV of the additional visit past what it still visits."""
-    i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
-    for s in range(plan.visits.length[i]):
-        planned.left_out[s] = not planned.kept[s] or planned.idle[row, s]
-    _charge_way(arrays, plan, trial, planned, i, place, j)
+def _can_unload(load: Floats, need: Floats, visits: Visits, amount: Floats, i: int, j: int) -> bool:
+    """Whether every visit of UAV `i` to target `j` can unload something.
+
+    It unloads something in all of them together, which they can share; or it has something left over, that it
+    can bring in place of another UAV.
+    """
+    m = visits.length.shape[0]
+    for k in range(amount.shape[1]):
+        if load[0, i, k] <= 0.0 or need[0, j, k] <= 0.0:
+            continue
+        left = load[0, i, k]
+        for s in range(visits.length[i]):
+            left -= amount[s * m + i, k]
+            if visits.target[i, s] == j and not _unloads_nothing(load, need, visits.target, amount, i, s):
+                return True
+        if left > ROUNDING * load[0, i, k]:
+            return True
+    return False
 
 
 @simulator.compiled
 def _charge_way(
-    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: PlannedTrial, h: int, place: int, j: int
+    arrays: ProblemArrays,
+    visits: Visits,
+    leg: Floats,
+    back: Floats,
+    left_out: Flags,
+    total: Floats,
+    h: int,
+    place: int,
+    j: int,
 ) -> None:
     """Charge the legs of a route that differ from the plan's: `j` is added, ``left_out`` are not flown."""
-    episodes = trial.episodes
-    length, weight = plan.visits.length[h], arrays.weight[0]
-    episodes.at[0, h] = simulator.START
-    before = simulator.START
+    length, weight = visits.length[h], arrays.weight[0]
+    at = before = simulator.START
     for s in range(length + 1):
         if s == place:
-            charge(trial, -weight * simulator.leg_to(arrays, episodes, 0, h, j))
-            episodes.at[0, h] = j
+            charge(total, -weight * (arrays.start_target[0, h, j] if at < 0 else arrays.between[0, at, j]))
+            at = j
         if s == length:
             break
-        following = plan.visits.target[h, s]
-        if planned.left_out[s]:
-            charge(trial, weight * plan.leg[h, s])
-        else:
-            if episodes.at[0, h] != before:
-                charge(trial, weight * plan.leg[h, s])
-                charge(trial, -weight * simulator.leg_to(arrays, episodes, 0, h, following))
-            episodes.at[0, h] = following
-        before = following
-    if arrays.charge_return[0] and episodes.at[0, h] != before:
-        charge(trial, weight * plan.back[h])
-        charge(trial, -weight * simulator.leg_home(arrays, episodes, 0, h))
-
-
-@simulator.compiled
-def _move(visits: Visits, slot: int, old: int, new: int) -> None:
-    """Take a slot out of one target's list and put it in its order into another's; NONE is no target."""
-    if old != NONE:
-        if visits.first[old] == slot:
-            visits.first[old] = visits.following[slot]
-        else:
-            at = visits.first[old]
-            while visits.following[at] != slot:
-                at = visits.following[at]
-            visits.following[at] = visits.following[slot]
-    if new != NONE:
-        if visits.first[new] == NONE or visits.first[new] > slot:
-            visits.following[slot] = visits.first[new]
-            visits.first[new] = slot
-        else:
-            at = visits.first[new]
-            while visits.following[at] != NONE and visits.following[at] < slot:
-                at = visits.following[at]
-            visits.following[slot] = visits.following[at]
-            visits.following[at] = slot
-
-
-@simulator.compiled
-def _connected(plan: FlownPlan, trial: Trial, planned: PlannedTrial) -> int:
-    """List the targets that visits connect with the additional one, by their rank, and their UAVs."""
-    visits, unloading = planned.visits, planned.unloading
-    trial.tally[MARK] += 1
-    trial.tally[CHANGED] = 0
-    m, found = plan.back.shape[0], 1
-    unloading.served[0] = trial.inserted[2]
-    trial.target_mark[trial.inserted[2]] = trial.tally[MARK]
-    found = _add_route(plan.visits, trial, unloading, trial.inserted[0], found)
-    head = 0
-    while head < found:
-        slot = visits.first[unloading.served[head]]
-        while slot != NONE:
-            if trial.uav_mark[slot % m] != trial.tally[MARK]:
-                found = _add_route(visits, trial, unloading, slot % m, found)
-            slot = visits.following[slot]
-        head += 1
-    if found * found > unloading.order.shape[0]:
-        q = 0
-        for place in range(unloading.order.shape[0]):
-            if trial.target_mark[unloading.order[place]] == trial.tally[MARK]:
-                unloading.served[q] = unloading.order[place]
-                q += 1
-        return found
-    for q in range(1, found):
-        x, place = unloading.served[q], q
-        while place > 0 and unloading.rank[unloading.served[place - 1]] > unloading.rank[x]:
-            unloading.served[place] = unloading.served[place - 1]
-            place -= 1
-        unloading.served[place] = x
-    return found
-
-
-@simulator.compiled
-def _add_route(visits: Visits, trial: Trial, unloading: Unloading, h: int, found: int) -> int:
-    """Add a UAV and the targets of its route to the lists; return how many targets are listed."""
-    trial.uav_mark[h] = trial.tally[MARK]
-    trial.changed[trial.tally[CHANGED]] = h
-    trial.tally[CHANGED] += 1
-    for s in range(visits.length[h]):
         x = visits.target[h, s]
-        if trial.target_mark[x] != trial.tally[MARK]:
-            trial.target_mark[x] = trial.tally[MARK]
-            unloading.served[found] = x
-            found += 1
-    return found
+        if left_out[s]:
+            charge(total, weight * leg[h, s])
+        else:
+            if at != before:
+                now = arrays.start_target[0, h, x] if at < 0 else arrays.between[0, at, x]
+                exchange(total, -weight * leg[h, s], -weight * now)
+            at = x
+        before = x
+    if arrays.charge_return[0] and at != before:
+        now = arrays.start_home[0, h] if at < 0 else arrays.home[0, h, at]
+        exchange(total, -weight * back[h], -weight * now)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.simulation import simulator
 from app.simulation.arrays import Floats, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
+from app.simulation.insertion import inlined
 
 STEP, RANGE, TIME = 1, 2, 4
 """What a visit lacks, as a sum, where the UAV keeps all the others of its route."""
@@ -13,10 +14,10 @@ STEP, RANGE, TIME = 1, 2, 4
 @simulator.compiled
 def is_late(after: float, deadline: float) -> bool:
     """Whether an arrival that is so long after a deadline is too late."""
-    return after > abs(deadline) * simulator.TOLERANCE
+    return deadline + after > simulator.latest(deadline)
 
 
-@simulator.compiled
+@inlined
 def _leg(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
     """Distance to a target from where a UAV is before its visit `place`."""
     at = simulator.START if place == 0 else plan.visits.target[i, place - 1]
@@ -24,7 +25,7 @@ def _leg(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> 
     return leg
 
 
-@simulator.compiled
+@inlined
 def detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -> float:
     """Distance to a target and on to the next one, more than there directly."""
     extra = _leg(arrays, plan, i, place, j)
@@ -75,6 +76,6 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
         arrival = plan.clock[i, s] + (plan.leg[i, s] + extra) / speed + arrays.service[0, j]
         lacks[3 + s - place] = arrival - arrays.deadline[0, x]
         late = late or is_late(lacks[3 + s - place], arrays.deadline[0, x])
-    if lacks[1] > voyage * simulator.TOLERANCE:
+    if voyage + lacks[1] > simulator.farthest(voyage):
         lack += RANGE
     return lack + TIME if late else lack

@@ -41,6 +41,7 @@ def unmet_targets(
     arrays: ProblemArrays,
     actions: Integers,
     delivered: Floats,
+    needs: Floats,
     hurry: Callable[[], bool],
 ) -> tuple[Unmet, ...]:
     """List the targets with needs left at the end of a plan.
@@ -51,6 +52,8 @@ def unmet_targets(
         The problem, and the same as a stack of one.
     actions, delivered
         (S', M) joint actions and (S', M, K) what they unload.
+    needs
+        (N, K) what is still needed at the end, as it is to be printed.
     hurry
         Once it is true, nothing more is looked at.
     """
@@ -64,7 +67,8 @@ def unmet_targets(
     scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
     start = look_from_start(arrays, plan, open_targets)
     lookout = Lookout(arrays, plan, *scratch, hurry)
-    judge = _Judge(problem, arrays, plan, start, lookout, Counterfactuals(problem, arrays, plan, *scratch))
+    counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
+    judge = _Judge(problem, arrays, plan, needs, start, lookout, counterfactuals)
     found = {int(j): judge.reason(int(j)) for j in urgent}
     return tuple(found[int(j)] for j in open_targets)
 
@@ -86,12 +90,13 @@ class _Judge:
         problem: Problem,
         arrays: ProblemArrays,
         plan: FlownPlan,
+        needs: Floats,
         start: Start,
         lookout: Lookout,
         counterfactuals: Counterfactuals,
     ) -> None:
         self._problem, self._arrays, self._plan, self._start = problem, arrays, plan, start
-        self._lookout, self._counterfactuals = lookout, counterfactuals
+        self._needs, self._lookout, self._counterfactuals = needs, lookout, counterfactuals
         self._says = Wording(problem, plan)
 
     def reason(self, j: int) -> Unmet:
@@ -136,7 +141,7 @@ class _Judge:
                 helping.append((remedy, outcome))
         if helping:
             remedy, outcome = helping[0]
-            return self._unmet(j, code, says + self._says.even_then(outcome.gain), remedy, outcome)
+            return self._unmet(j, code, says, remedy, outcome)
         return self._unmet(j, code, says, uav=uav)
 
     def _of_this_plan(self, j: int, places: Places) -> Unmet:
@@ -224,9 +229,11 @@ class _Judge:
             uav = visit.uav if uav is None else uav
             if stated:
                 remedy = self._says.remedy(visit.uav, visit.place, visit.new, visit.relaxation)
+                if outcome is not None and outcome.gain <= 0:
+                    remedy += self._says.even_then(outcome.gain)
         return Unmet(
             target_id=self._problem.targets[j].id,
-            remaining=tuple(self._plan.remaining[j].tolist()),
+            remaining=tuple(self._needs[j].tolist()),
             code=code,
             reason=f"{self._says.missing(j)}: {says}",
             uav_id=None if uav is None else self._problem.uavs[uav].id,

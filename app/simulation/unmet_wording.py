@@ -26,8 +26,9 @@ class Wording:
 
     def missing(self, j: int) -> str:
         """How much target `j` lacks of what it needed."""
-        left, needed = self._plan.remaining[j], self._problem.targets[j].loadlist
-        amounts = [f"{left[k]:.6g} of {needed[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0)]
+        left, target = self._plan.remaining[j], self._problem.targets[j]
+        whole = target.loadlist if target.requested is None else target.requested
+        amounts = [f"{left[k]:.6g} of {whole[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0)]
         return " and ".join(amounts) + " missing"
 
     def no_supply(self) -> str:
@@ -91,10 +92,10 @@ class Wording:
         )
 
     def even_then(self, gain: float) -> str:
-        """What the remedy of a hard reason costs, where it brings nothing."""
+        """What a visit costs in spite of its remedy."""
         if gain < 0:
-            return f"; with the remedy the visit would still cost {-gain:.6g} more than it earns"
-        return "; with the remedy the visit would still earn no more than it costs"
+            return f"; the visit would still cost {-gain:.6g} more than it earns"
+        return "; the visit would still earn no more than it costs"
 
     def remedy(self, i: int, place: int, new: bool, relaxation: Relaxation | None) -> str:
         """What would change it: another visit, or what has to be allowed for it."""

@@ -2,26 +2,22 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import FOLDER, problem_of
 from problems import random_plan, random_problem, strained
 from reason_referee import objections
 
-from app.api.problem_models import ProblemModel, to_problem
 from app.domain.allocation import UnmetCode
 from app.domain.errors import IllegalPlan
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record, to_record
-from app.settings import Settings
 from app.simulation.counterfactual import rounded_up
 from app.simulation.explain import explain
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
-
-CASES = Path(__file__).parents[1] / "cases"
 
 
 def problem(**target):
@@ -121,19 +117,17 @@ def test_no_single_visit_contradicts_a_reason_and_every_remedy_works(unloading, 
     assert codes >= (set(UnmetCode) if unloading == "greedy" else set(UnmetCode) - rare)
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in CASES.glob("reason-false-*.json")))
+@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("reason-false-*.json")))
 def test_reasons_that_were_false(name):
-    given = json.loads((CASES / name).read_text())
-    case = to_problem(ProblemModel(**given["problem"]), Settings())
-    wrong, unmet = objections_to(case, Plan(tuple(tuple(row) for row in given["answer_assignment"])))
+    given = json.loads((FOLDER / f"{name}.json").read_text())
+    plan = Plan(tuple(tuple(row) for row in given["answer_assignment"]))
+    wrong, unmet = objections_to(problem_of(name), plan)
     assert not wrong
     assert unmet
 
 
 def test_time_that_is_used_up_is_not_called_loads():
-    body = json.loads((CASES / "F5a-time-named-loads.json").read_text())
-    case = to_problem(ProblemModel(**{k: v for k, v in body.items() if k != "algorithm"}), Settings())
-    wrong, (unmet,) = objections_to(case, Plan(((0,),)))
+    wrong, (unmet,) = objections_to(problem_of("F5a-time-named-loads"), Plan(((0,),)))
     assert not wrong
     assert (unmet["code"], unmet["uav_id"], unmet["step"], unmet["verified"]) == ("time_used", "u", 2, True)
     assert unmet["remedy"] == "a deadline 102 later for b"
@@ -151,6 +145,24 @@ def test_time_used_names_the_deadline_of_the_visit_that_would_come_too_late():
     assert unmet["code"] == "time_used"
     assert unmet["relaxation"]["later_deadlines"] == [{"target_id": "near", "by": 1.0}]
     assert "1 after the deadline of near" in unmet["reason"]
+
+
+def test_a_visit_after_which_another_uav_comes_first():
+    # When second flies to aside first, first is before it at shared, and second need not fly there at all.
+    uavs = (
+        UAV("first", 0, 0, 0, 0, speed=1.0, voyage=99.0, loadlist=(5.0, 0.0)),
+        UAV("second", 0, 0, 0, 0, speed=1.0, voyage=99.0, loadlist=(3.0, 1.0)),
+    )
+    targets = (
+        Target("own", 1, 0, level=1.0, loadlist=(1.0, 0.0)),
+        Target("shared", 9, 0, level=1.0, loadlist=(4.0, 0.0)),
+        Target("aside", 0, 1, level=0.01, loadlist=(0.0, 1.0)),
+    )
+    case = Problem(uavs=uavs, targets=targets, objective=Objective(distance_weight=0.1))
+    wrong, (unmet,) = objections_to(case, Plan(((0, 1), (1, 3))))
+    assert not wrong
+    assert (unmet["code"], unmet["uav_id"], unmet["step"]) == ("not_chosen", "second", 1)
+    assert unmet["reward_change"] == pytest.approx(0.01 - 0.1 * 1 + 0.1 * 9)
 
 
 def test_an_area_that_got_nearly_all_says_how_much_is_missing_and_who_could_bring_it():
@@ -174,10 +186,9 @@ def test_a_gain_that_is_small_beside_the_reward_of_other_areas_is_a_gain():
     assert (unmet.code, unmet.reward_change) == ("not_chosen", pytest.approx(1e-12))
 
 
-@pytest.mark.parametrize("name", ["F3a-ten-tenths.json", "F3c-crumb-two-areas.json"])
+@pytest.mark.parametrize("name", ["F3a-ten-tenths", "F3c-crumb-two-areas"])
 def test_what_is_met_in_full_is_not_listed(name):
-    body = json.loads((CASES / name).read_text())
-    case = to_problem(ProblemModel(**{k: v for k, v in body.items() if k != "algorithm"}), Settings())
+    case = problem_of(name)
     assert [unmet.target_id for unmet in explain(case, greedy_plan(case)).unmet] == [
         target.id for target in case.targets if target.id == "far"
     ]

@@ -59,6 +59,11 @@ def fly(problem: dict, record: dict, order: tuple[int, ...]) -> float | None:
     return length + (apart(crs, craft.place, craft.home) if objective.get("charge_return") else 0.0)
 
 
+def asked_by(area: dict) -> list[float]:
+    """What an area requested at first."""
+    return area["loadlist"] if area.get("requested") is None else area["requested"]
+
+
 def best_satisfaction(problem: dict, visited: list[tuple[int, ...]]) -> float:
     """The linear program: amounts of each visit, within loads and needs."""
     areas = problem["targets"]
@@ -76,7 +81,7 @@ def best_satisfaction(problem: dict, visited: list[tuple[int, ...]]) -> float:
     program.setOptionValue("output_flag", False)
     none = (np.empty(0, np.int32), np.empty(0))
     for i, j, k in variables:
-        worth = areas[j]["level"] / sum(needs[j])
+        worth = areas[j]["level"] / sum(asked_by(areas[j]))
         most = min(problem["uavs"][i]["loadlist"][k], needs[j][k])
         program.addCol(-worth, 0.0, most, 0, *none)
 

@@ -87,6 +87,7 @@ def strained(problem: Problem, rng: np.random.Generator) -> Problem:
             deadline=across * float(rng.uniform(-0.1, 2.5)) if rng.random() < 0.5 else None,
             service_time=across * float(rng.choice([0.0, 0.2, 1.0])),
             level=target.level * float(10.0 ** rng.integers(-2, 2)),
+            requested=tuple(2 * amount for amount in target.loadlist) if rng.random() < 0.2 else None,
         )
         for target in problem.targets
     )

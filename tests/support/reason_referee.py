@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 
-from brute_force_unloading import best_satisfaction
+from brute_force_unloading import asked_by, best_satisfaction
 from referee import TOLERANCE, Aircraft, Illegal, apart, replay, weight_of
 
 CRUMB = 1e-9
@@ -78,19 +78,16 @@ def can_unload(problem, routes, i, j):
     if j not in flown[i]:
         return False
     whole = best_satisfaction(problem, flown)
-    per_unit = problem["targets"][j]["level"] / sum(problem["targets"][j]["loadlist"])
+    per_unit = problem["targets"][j]["level"] / sum(asked_by(problem["targets"][j]))
     for k, (have, want) in enumerate(
         zip(problem["uavs"][i]["loadlist"], problem["targets"][j]["loadlist"], strict=True)
     ):
         little = 1e-3 * min(have, want)
         if little > 0:
             rest = copy.deepcopy(problem)
+            rest["targets"][j]["requested"] = asked_by(problem["targets"][j])
             rest["uavs"][i]["loadlist"][k] -= little
             rest["targets"][j]["loadlist"][k] -= little
-            # A unit stays worth what it is by the need in the request.
-            rest["targets"][j]["level"] *= sum(rest["targets"][j]["loadlist"]) / sum(
-                problem["targets"][j]["loadlist"]
-            )
             if best_satisfaction(rest, flown) + per_unit * little >= whole - 1e-9 * max(1.0, whole):
                 return True
     return False
