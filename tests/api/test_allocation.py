@@ -8,7 +8,7 @@ from app.api.openapi_examples import ALLOCATION_EXAMPLES, example_problem
 QUICK = {
     "greedy": {},
     "ga": {"num_total": 10, "iteration": 20},
-    "qmix": {"n_epochs": 20, "buffer_size": 8, "batch_size": 4, "evaluate_per_epoch": 10},
+    "qmix": {"n_epochs": 20, "batch_size": 4, "evaluate_per_epoch": 10},
 }
 MINIMAL = {
     "uavs": [
@@ -80,7 +80,14 @@ def test_minimal_problem_has_the_defaults_of_the_specification(client):
             "code": "not_worth_it",
             "reason": answer["unmet"][0]["reason"],
             "uav_id": "uav-1",
-            "remedy": "4 of material 1 more aboard uav-1",
+            "step": 1,
+            "remedy": "1 of material 1 more aboard uav-1",
+            "relaxation": {
+                "more_load": [1.0],
+                "more_range": 0.0,
+                "more_steps": 0,
+                "later_deadlines": [],
+            },
             "reward_change": pytest.approx(1 - 3 * 10**-0.5),
             "verified": True,
         }
@@ -146,12 +153,16 @@ def test_every_algorithm_is_listed_with_its_defaults(client):
         "n_epochs": 50_000,
         "evaluate_per_epoch": 100,
         "batch_size": 32,
-        "buffer_size": 100,
-        "update_target_params": 200,
         "drqn_hidden_dim": 64,
         "qmix_hidden_dim": 32,
     }
     assert table_1.items() <= listed["qmix"]["defaults"].items()
+    # Only paper mode uses these; the default mode refuses them.
+    for name, value in {"buffer_size": 100, "update_target_params": 200}.items():
+        assert listed["qmix"]["defaults"][name] is None
+        described = listed["qmix"]["parameters"]["properties"][name]
+        assert described["modes"] == ["paper"]
+        assert f": {value})" in described["description"]
     # Epochs are 200 in paper mode (Table 3) and follow from the size in service mode, so null.
     table_3 = {**table_1, "n_epochs": None, "evaluate_per_epoch": 1}
     assert table_3.items() <= listed["transfer_qmix"]["defaults"].items()

@@ -192,7 +192,7 @@ def begun_and_left(service, problem, **headers):
     head = "".join(f"{name}: {value}\r\n" for name, value in given.items())
     url = service.client.base_url
     connection = socket.create_connection((url.host, url.port))
-    connection.sendall(f"POST /allocate HTTP/1.1\r\nHost: x\r\n{head}\r\n".encode() + body)
+    connection.sendall(f"POST /allocate HTTP/1.1\r\nHost: {url.host}\r\n{head}\r\n".encode() + body)
     while True:
         found = service.client.get("/jobs", params={"limit": 1}).json()["jobs"][0]
         if found["id"] not in before and found["status"] == "running":

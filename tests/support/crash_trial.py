@@ -67,8 +67,14 @@ class Ledger:
             self._cancelled.add(job_id)
 
     def read(self, job: dict[str, Any]) -> None:
-        """Compare a finished job with how it was when it was read first."""
+        """Compare a finished job with how it was when it was read first.
+
+        Reasons for unmet needs that its time limit left no room for come after its end.
+        """
         seen = {name: job[name] for name in ("status", "result", "error")}
+        if seen["result"] is not None:
+            late = ("unmet", "reasons")
+            seen["result"] = {name: value for name, value in seen["result"].items() if name not in late}
         with self._lock:
             if self._final.setdefault(job["id"], seen) != seen:
                 self.broken.append(f"job {job['id']} has changed after its end")
