@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import distance
-from app.domain.problem import Problem
+from app.domain.problem import ROUNDING, Problem
 from app.simulation.distances import between_points
 
 Floats = npt.NDArray[np.float64]
@@ -46,6 +46,8 @@ class ProblemArrays(NamedTuple):
         (P, N, K) amounts needed.
     requested
         (P, N, K) amounts that the needs are a part of; the needs, where the request says nothing else.
+    crumb
+        (P,) amount below which what is left of another one may be rounding: that share of the largest.
     need_total
         (P, N) sum of the needs over materials; 0 for a target that needs nothing.
     level
@@ -72,6 +74,7 @@ class ProblemArrays(NamedTuple):
     load: Floats
     need: Floats
     requested: Floats
+    crumb: Floats
     need_total: Floats
     level: Floats
     deadline: Floats
@@ -119,6 +122,10 @@ def _compile(problem: Problem) -> ProblemArrays:
     current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
     area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
     need = np.array([t.need for t in targets], dtype=np.float64)
+    load = np.array([u.loadlist for u in uavs], dtype=np.float64)
+    requested = np.array(
+        [t.loadlist if t.requested is None else t.requested for t in targets], dtype=np.float64
+    )
     start_target = between_points(problem.crs, current, area)
     # Most swarms are where they start, and have the same way to a target as home from it.
     home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, area)
@@ -133,11 +140,10 @@ def _compile(problem: Problem) -> ProblemArrays:
         voyage=np.array([[u.voyage for u in uavs]], dtype=np.float64),
         dis=np.array([[u.dis for u in uavs]], dtype=np.float64),
         ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
-        load=np.array([[u.loadlist for u in uavs]], dtype=np.float64),
+        load=load[None],
         need=need[None],
-        requested=np.array(
-            [[t.loadlist if t.requested is None else t.requested for t in targets]], dtype=np.float64
-        ),
+        requested=requested[None],
+        crumb=np.array([ROUNDING * max(load.max(), requested.max())]),
         need_total=need.sum(axis=1)[None],
         level=np.array([[t.urgency for t in targets]], dtype=np.float64),
         deadline=np.array(

@@ -252,9 +252,15 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
     d = fly_to(arrays, episodes, b, i, action)
     earned = 0.0
     for k in range(episodes.load.shape[2]):
-        unloaded = min(episodes.load[b, i, k], episodes.need[b, action, k])
+        load, need = episodes.load[b, i, k], episodes.need[b, action, k]
+        unloaded = min(load, need)
         if unloaded > 0.0:
-            earned += unload(arrays, episodes, b, i, action, k, unloaded)
+            # One of the two is used up; what is left of the other is seldom so little that it is rounding.
+            if 0.0 < max(load, need) - unloaded < arrays.crumb[p]:
+                earned += unload(arrays, episodes, b, i, action, k, unloaded)
+            else:
+                episodes.load[b, i, k], episodes.need[b, action, k] = load - unloaded, need - unloaded
+                earned += arrays.level[p, action] * unloaded / arrays.need_total[p, action]
     episodes.satisfaction[b] += earned
     return earned - arrays.weight[p] * d
 

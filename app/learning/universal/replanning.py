@@ -113,6 +113,7 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
         load=arrays.load[0][uavs],
         need=np.where(worthwhile[:, :, None], need, 0.0),
         requested=arrays.requested[0][targets],
+        crumb=np.repeat(arrays.crumb, count),
         need_total=arrays.need_total[0][targets],
         level=arrays.level[0][targets],
         deadline=arrays.deadline[0][targets],
