@@ -52,14 +52,14 @@ class Start(NamedTuple):
     ----------
     carrier, missing
         (N,) the UAV that carries something needed and lacks least range, and how much it lacks.
-    fastest, late
-        (N,) the UAV among those with the range that arrives first, and how long after the deadline.
+    fastest, arrival
+        (N,) the UAV among those with the range that arrives first, and when.
     """
 
     carrier: Integers
     missing: Floats
     fastest: Integers
-    late: Floats
+    arrival: Floats
 
 
 class Places(NamedTuple):
@@ -137,7 +137,7 @@ class Lookout:
     def look(self, j: int, start: Start) -> Places | None:
         """Look at all places for a visit to target `j`; None if that cannot be finished."""
         comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
-        if comers == _IN_RANGE and not is_late(float(start.late[j]), float(self._arrays.deadline[0, j])):
+        if comers == _IN_RANGE and not is_late(float(start.arrival[j]), float(self._arrays.deadline[0, j])):
             comers = _IN_TIME
         found = Places(
             np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
@@ -166,7 +166,8 @@ class Lookout:
         if lacks & TIME:
             route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
             for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
-                if is_late(after, float(self._arrays.deadline[0, x])):
+                deadline = float(self._arrays.deadline[0, x])
+                if is_late(deadline + after, deadline):
                     late[x] = max(after, late.get(x, 0.0))
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
 
@@ -202,9 +203,9 @@ def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, 
             if missing < start.missing[j]:
                 start.missing[j], start.carrier[j] = missing, i
             if arrays.voyage[0, i] + missing <= simulator.farthest(arrays.voyage[0, i]):
-                late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
-                if start.fastest[j] < 0 or late < start.late[j]:
-                    start.late[j], start.fastest[j] = late, i
+                arrival = arrays.start_target[0, i, j] / arrays.speed[0, i]
+                if arrival < start.arrival[j]:
+                    start.arrival[j], start.fastest[j] = arrival, i
 
 
 @inlined
@@ -212,8 +213,7 @@ def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) 
     """Whether a UAV counts among those that could come: carriers, those in range, or those in time too."""
     voyage = arrays.voyage[0, i]
     in_range = voyage + _missing(arrays, i, j) <= simulator.farthest(voyage)
-    late = arrays.start_target[0, i, j] / arrays.speed[0, i] - arrays.deadline[0, j]
-    in_time = not is_late(late, arrays.deadline[0, j])
+    in_time = not is_late(arrays.start_target[0, i, j] / arrays.speed[0, i], arrays.deadline[0, j])
     near = (comers < _IN_RANGE or in_range) and (comers < _IN_TIME or in_time)
     return near and _carries(arrays, plan, i, j)
 

@@ -12,9 +12,9 @@ STEP, RANGE, TIME = 1, 2, 4
 
 
 @simulator.compiled
-def is_late(after: float, deadline: float) -> bool:
-    """Whether an arrival that is so long after a deadline is too late."""
-    return deadline + after > simulator.latest(deadline)
+def is_late(arrival: float, deadline: float) -> bool:
+    """Whether an arrival is after a deadline, beyond the tolerance."""
+    return arrival > simulator.latest(deadline)
 
 
 @inlined
@@ -65,8 +65,9 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
     if arrays.return_to_base[0]:
         reach += arrays.home[0, i, j]
     lacks[1] = reach - voyage
-    lacks[2] = plan.clock[i, place] + there / speed - arrays.deadline[0, j]
-    late = is_late(lacks[2], arrays.deadline[0, j])
+    arrival = plan.clock[i, place] + there / speed
+    lacks[2] = arrival - arrays.deadline[0, j]
+    late = is_late(arrival, arrays.deadline[0, j])
     for s in range(place, length):
         x = plan.visits.target[i, s]
         reach = plan.flown[i, s + 1] + extra
@@ -75,7 +76,7 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
         lacks[1] = max(lacks[1], reach - voyage)
         arrival = plan.clock[i, s] + (plan.leg[i, s] + extra) / speed + arrays.service[0, j]
         lacks[3 + s - place] = arrival - arrays.deadline[0, x]
-        late = late or is_late(lacks[3 + s - place], arrays.deadline[0, x])
+        late = late or is_late(arrival, arrays.deadline[0, x])
     if voyage + lacks[1] > simulator.farthest(voyage):
         lack += RANGE
     return lack + TIME if late else lack

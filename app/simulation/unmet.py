@@ -111,8 +111,9 @@ class _Judge:
             return self._hard(
                 j, UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least, places
             )
-        late = float(self._start.late[j])
-        if is_late(late, float(self._arrays.deadline[0, j])):
+        arrival, deadline = float(self._start.arrival[j]), float(self._arrays.deadline[0, j])
+        if is_late(arrival, deadline):
+            late = arrival - deadline
             least = _Remedy(fastest, 0, relaxation_for(self._problem, late={j: late}))
             return self._hard(j, UnmetCode.DEADLINE, self._says.deadline(fastest, late), least, places)
         if places is None:
