@@ -137,7 +137,7 @@ def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(st
     while len(service.client.get("/jobs").json()["jobs"]) < 3:
         time.sleep(0.01)
     unfinished = socket.create_connection((url.host, url.port))
-    unfinished.sendall(b"POST /allocate HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n{")
+    unfinished.sendall(b"POST /allocate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{")
     service.client.get("/healthz")  # what was sent before has arrived
 
     service.process.send_signal(signal.SIGTERM)
