@@ -29,8 +29,19 @@ def test_source_tasks_are_drawn_and_sorted_by_similarity(page, service):
 def test_policy_of_an_allocation_is_registered_and_deleted(page, service):
     ready(page)
     open_problem(page, example_problem("paper-5x10"), "the paper's")
-    parameters = {"n_epochs": 2, "samples": 0, "polish": False}
-    show_answer(page, service.url, algorithm="transfer_qmix", parameters=parameters)
+    go(page, "allocate")
+    keeping = page.locator("select[name=keep_checkpoint]")
+    page.select_option("select[name=algorithm]", "greedy")
+    expect(keeping).to_be_hidden()
+    page.select_option("select[name=algorithm]", "transfer_qmix")
+    keeping.select_option("true")
+    page.fill("input[name=time_limit_s]", "")
+    page.locator("#parameters").evaluate("details => { details.open = true; }")
+    page.fill("#parameters input[name=n_epochs]", "2")
+    page.fill("#parameters input[name=samples]", "0")
+    page.select_option("#parameters select[name=polish]", "false")
+    page.click("#start")
+    page.wait_for_selector("#figures")
     go(page, "library")
     form = page.locator("#view-library form").first
     form.locator("input[name=name]").fill("from the field")
