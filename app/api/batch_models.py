@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from app.api.allocation_models import Allocation, AllocationRequest, AnswerModel
 from app.api.errors import BatchTooLarge
 from app.api.problem_models import Identifier, WireModel
+from app.domain.identifiers import fault_of
 from app.settings import Settings
+
+
+def _sound(identifier: str) -> str:
+    fault = fault_of(identifier)
+    if fault is not None:
+        raise ValueError(fault)
+    return identifier
 
 
 class BatchItem(AllocationRequest):
@@ -20,7 +28,9 @@ class BatchItem(AllocationRequest):
     algorithm: str = Field(
         default="transfer_qmix", description="See `GET /algorithms`", examples=["auto", "transfer_qmix"]
     )
-    id: Identifier | None = Field(default=None, description="Comes back with the answer; need not be unique")
+    id: Annotated[Identifier, AfterValidator(_sound)] | None = Field(
+        default=None, description="Comes back with the answer; need not be unique"
+    )
 
     @classmethod
     def require_sizes(cls, body: Mapping[str, Any], settings: Settings, at: str) -> None:

@@ -67,7 +67,7 @@ def test_web_process_loads_neither_torch_nor_compiled_code():
 
 def test_restart_keeps_jobs_and_library_and_goes_on_with_what_ran(start_service, problem):
     before = start_service(workers=1, max_checkpoint_bytes=10**6).await_ready()
-    parameters = {"n_epochs": 4, "buffer_size": 2, "batch_size": 2}
+    parameters = {"n_epochs": 4, "batch_size": 2}
     quick = {**problem, "algorithm": "qmix", "parameters": parameters, "keep_checkpoint": True}
     answer = before.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json()
     policy = before.client.post("/library", json={"name": "kept", "job_id": answer["job_id"]}).json()
@@ -256,7 +256,7 @@ def test_large_answers_are_compressed_and_streams_are_not(client, problem):
     def encoding(path):
         return client.get(path, headers={"Accept-Encoding": "gzip"}).headers.get("content-encoding")
 
-    assert encoding("/openapi.json") == encoding("/dashboard/js/main.js") == "gzip"
+    assert encoding("/openapi.json") == encoding("/dashboard/js/map.js") == "gzip"
     assert encoding("/healthz") is None
     assert client.get("/openapi.json", headers={"Accept-Encoding": "identity"}).json()["openapi"]
     policy = client.get("/library").json()["policies"][0]["id"]

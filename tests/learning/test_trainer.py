@@ -211,7 +211,7 @@ def test_result_is_never_worse_than_sending_everybody_home(make_network):
 
 
 def test_streams_of_a_seed_are_independent_and_repeatable():
-    first, again, other = random_streams(5), random_streams(5), random_streams(-5)
+    first, again, other = random_streams(5), random_streams(5), random_streams(6)
     draws = [
         (s.initialisation.initial_seed(), s.exploration.random(), s.replay.random())
         for s in (first, again, other)

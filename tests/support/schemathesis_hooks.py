@@ -38,6 +38,13 @@ def breaks_rules(problem):
     groups = problem["uavs"], problem["targets"]
     if len({len(each["loadlist"]) for group in groups for each in group}) > 1:
         return True
+    for target in problem["targets"]:
+        asked = target.get("requested")
+        if asked is not None and (
+            len(asked) != len(target["loadlist"])
+            or any(a < b for a, b in zip(asked, target["loadlist"], strict=True))
+        ):
+            return True
     for group, default in zip(groups, ("uav-", "area-"), strict=True):
         ids = [each.get("id") or f"{default}{number}" for number, each in enumerate(group, 1)]
         if len(set(ids)) < len(ids) or any(fault_of(each) is not None for each in ids):
