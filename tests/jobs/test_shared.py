@@ -142,8 +142,8 @@ def test_of_those_who_take_a_job_out_of_its_turn_at_once_one_gets_it(url):
     with ThreadPoolExecutor(2) as threads:
         for _ in range(50):
             taken_in, _ = stores[0].insert(hasty, {}, run_now=False, limit=QueueLimit(100, 1.0))
-            claims = list(threads.map(lambda store, job_id=taken_in.job.id: store.claim_this(job_id), stores))
-            [claim] = [claim for claim in claims if claim is not None]
+            claims = threads.map(lambda store, job_id=taken_in.job.id: store.claim_these([job_id]), stores)
+            [claim] = [claim for taken in claims for claim in taken]
             assert (claim.job.id, claim.job.attempt) == (taken_in.job.id, 1)
     for store in stores:
         store.database.dispose()
