@@ -135,6 +135,19 @@ class _Patient(h11.Connection):
         return super().next_event()
 
 
+class _KeptOpen:
+    """A transport whose end is left to the protocol: closed at once, a client that still sends loses its answer."""
+
+    def __init__(self, transport: asyncio.Transport) -> None:
+        self._transport = transport
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def close(self) -> None:
+        """Leave it open."""
+
+
 class BoundedProtocol(H11Protocol):
     """HTTP/1.1 on a connection that leaves room for others."""
 
@@ -197,11 +210,11 @@ class BoundedProtocol(H11Protocol):
 
     def on_response_complete(self) -> None:
         """Go on with the next request; a client that still sends the body of this one is not heard."""
-        unread = self.conn.their_state is h11.SEND_BODY
+        last = self.conn.their_state is h11.SEND_BODY or self.conn.our_state is h11.CLOSED
         super().on_response_complete()
         if self.transport.is_closing():
             return
-        if unread:
+        if last:
             self._end()
         else:
             self._all.receives(self, not self._works())
@@ -224,9 +237,17 @@ class BoundedProtocol(H11Protocol):
 
     async def _serve(self, scope: Any, receive: Any, send: Any) -> None:
         """Let the application answer, but for requests whose length is given in two ways (RFC 9112, 6.1)."""
+
+        async def send_on(message: Any) -> None:
+            if message["type"] == "http.response.start" and self.conn.their_state is h11.SEND_BODY:
+                # The client has to know that no other request is taken (RFC 9112, 9.6).
+                message = {**message, "headers": [*message["headers"], (b"connection", b"close")]}
+                self.cycle.transport = _KeptOpen(self.transport)  # type: ignore[assignment]
+            await send(message)
+
         names = {name for name, _ in scope["headers"]}
-        if scope["type"] != "http" or not {b"content-length", b"transfer-encoding"} <= names:
-            await self._application(scope, receive, send)
+        if not {b"content-length", b"transfer-encoding"} <= names:
+            await self._application(scope, receive, send_on)
             return
         refusal = problem_response(
             "bad-request",
@@ -234,4 +255,4 @@ class BoundedProtocol(H11Protocol):
             scope["path"],
             headers={**SECURITY_HEADERS, "Connection": "close"},
         )
-        await refusal(scope, receive, send)
+        await refusal(scope, receive, send_on)

@@ -158,13 +158,18 @@ def test_every_algorithm_is_listed_with_its_defaults(client):
     }
     assert table_1.items() <= listed["qmix"]["defaults"].items()
     # Only paper mode uses these; the default mode refuses them.
-    for name, value in {"buffer_size": 100, "update_target_params": 200}.items():
-        assert listed["qmix"]["defaults"][name] is None
-        described = listed["qmix"]["parameters"]["properties"][name]
+    for algorithm, name, value in [
+        ("qmix", "buffer_size", 100),
+        ("qmix", "update_target_params", 200),
+        ("transfer_qmix", "drqn_hidden_dim", 64),
+        ("transfer_qmix", "qmix_hidden_dim", 32),
+    ]:
+        assert listed[algorithm]["defaults"][name] is None
+        described = listed[algorithm]["parameters"]["properties"][name]
         assert described["modes"] == ["paper"]
         assert f": {value})" in described["description"]
     # Epochs are 200 in paper mode (Table 3) and follow from the size in service mode, so null.
-    table_3 = {**table_1, "n_epochs": None, "evaluate_per_epoch": 1}
+    table_3 = {"n_epochs": None, "evaluate_per_epoch": 1, "batch_size": 32}
     assert table_3.items() <= listed["transfer_qmix"]["defaults"].items()
     assert {"num_total": 30, "iteration": 200}.items() <= listed["ga"]["defaults"].items()
 

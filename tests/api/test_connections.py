@@ -137,6 +137,15 @@ def test_what_follows_a_refusal_is_not_read(chunks):
     assert sum(chunks) == read <= 1
 
 
+def test_an_answer_before_the_end_of_the_body_says_that_it_is_the_last():
+    part = b"POST /refused HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nx"
+    with served() as address, connected(address) as connection:
+        connection.sendall(part)
+        received = until_closed(connection)
+    assert received.startswith(b"HTTP/1.1 401")
+    assert b"connection: close\r\n" in received
+
+
 def test_a_request_that_was_refused_whole_keeps_its_connection():
     whole = b"POST /refused HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\n\r\nx"
     with served() as address, connected(address) as connection:

@@ -230,7 +230,7 @@ def test_a_plan_that_is_refused_leaves_the_one_before(page, service):
 def test_recent_plans_of_the_service_are_opened_with_their_problems(page, service):
     ready(page)
     problem = {**example_problem("paper-5x10"), "objective": {"unloading": "planned"}}
-    asked = {**problem, "algorithm": "local_search", "time_limit_s": 0.3}
+    asked = {**problem, "algorithm": "local_search", "parameters": {"moves": 10_000}}
     answer = httpx.post(f"{service.url}/allocate", json=asked, timeout=60).raise_for_status().json()
     go(page, "recent")
     row = page.locator(f"[data-testid=recent-plans] tr[data-job='{answer['job_id']}']")

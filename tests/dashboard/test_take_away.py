@@ -108,7 +108,7 @@ def test_choice_out_of_range_is_shown_at_its_field(planned):
     page.locator("button[data-format=qgc-plan]").click()
 
     expect(page.locator("label:has(input[name=altitude]) .error")).to_contain_text(
-        "less than or equal to 10000"
+        "99999, must be at most 10000"
     )
 
 
