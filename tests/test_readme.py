@@ -1,7 +1,7 @@
-"""Every command in README.md, run as it stands there against the service that `make run` starts.
+"""Every command in README.md and the manuals, run as it stands against the service that `make run` starts.
 
 Only the port is another one, so that a service on the default port is not in the way. `make run` is the
-fixture; `make test` would run itself, and `docker` needs an engine: both stand in prose, not in a block.
+fixture. Blocks of `console` are not run: they take long, or need a container engine or another machine.
 """
 
 import contextlib
@@ -20,13 +20,32 @@ import pytest
 from referee import replay
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
-SHELL = [text for language, text in BLOCKS if language == "sh" and text.strip() != "make run"]
-PYTHON = [text for language, text in BLOCKS if language == "python"]
-ANSWERS = [text for language, text in BLOCKS if language == "json"]
+PAGES = (
+    "README.md",
+    "app/domain/README.md",
+    "app/solvers/README.md",
+    "app/api/README.md",
+    "app/api/plan_formats/README.md",
+    "app/library/README.md",
+)
 START_S = 300.0
 COMMAND_S = 120.0
+
+
+def blocks(page, language):
+    """The blocks of a page that are in a language, without the command that is the fixture."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    found = re.findall(r"^```(\w+)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    return [block for name, block in found if name == language and block.strip() != "make run"]
+
+
+def blocks_of_pages(language):
+    """A parameter for each block, with its page and its place among those of the page."""
+    return [
+        pytest.param(block, id=f"{page}-{number}")
+        for page in PAGES
+        for number, block in enumerate(blocks(page, language))
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -71,19 +90,21 @@ def run(command, port):
 
 
 def test_there_is_something_to_run():
-    assert "make run\n" in [text for language, text in BLOCKS if language == "sh"]
-    assert len(SHELL) >= 4
-    assert PYTHON
-    assert ANSWERS
+    assert "```sh\nmake run\n```" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(blocks("README.md", "sh")) >= 2
+    assert blocks("README.md", "python")
+    assert blocks("README.md", "json")
+    for page in PAGES:
+        assert blocks(page, "sh"), page
 
 
-@pytest.mark.parametrize("block", SHELL, ids=range(len(SHELL)))
+@pytest.mark.parametrize("block", blocks_of_pages("sh"))
 def test_shell_block(block, port):
     output = run(["bash", "-ec", block.replace(":8000", f":{port}")], port)
     assert '"title"' not in output, f"{block}\n{output}"
 
 
-@pytest.mark.parametrize("block", PYTHON, ids=range(len(PYTHON)))
+@pytest.mark.parametrize("block", blocks_of_pages("python"))
 def test_python_block(block, port):
     assert "reward" in run([ROOT / ".venv/bin/python", "-c", block.replace(":8000", f":{port}")], port)
 
@@ -104,7 +125,7 @@ def test_the_example_is_answered_by_the_papers_algorithms(algorithm, port):
 
 def test_the_answer_that_is_shown_is_a_true_one():
     problem = json.loads((ROOT / "app/examples/cyclone-idai.json").read_text(encoding="utf-8"))
-    shown = json.loads(re.sub(r",?\s*…", "", ANSWERS[0]))
+    shown = json.loads(re.sub(r",?\s*…", "", blocks("README.md", "json")[0]))
     expected = replay(problem, shown["assignment"])
     assert shown["reward"] == pytest.approx(expected["reward"], abs=1e-6)
     assert shown["satisfaction"] == pytest.approx(expected["satisfaction"], abs=1e-6)
