@@ -239,7 +239,7 @@ def test_retry_with_the_same_key_is_the_same_job(client, problem):
     assert other.json()["type"] == "idempotency-key-reused"
 
 
-def test_full_queue_says_when_to_come_back(client, problem):
+def test_full_queue_says_when_to_come_back(client, problem, follow):
     jobs = []
     refused = None
     while refused is None:
@@ -251,6 +251,8 @@ def test_full_queue_says_when_to_come_back(client, problem):
             refused = response
     for job_id in jobs:
         client.delete(f"/jobs/{job_id}")
+    for job_id in jobs:
+        follow(job_id)
 
     assert len(jobs) == 4
     assert refused.status_code == 429
@@ -267,6 +269,7 @@ def test_job_that_was_cancelled_before_it_began_has_no_plan(client, problem, fol
     waiting.start()
     queued = None
     while queued is None:
+        assert not answers, answers[0].text
         newest = client.get("/jobs", params={"limit": 1}).json()["jobs"][0]
         queued = newest["id"] if newest["id"] not in running else None
     for job_id in (queued, *running):

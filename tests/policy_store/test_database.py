@@ -214,7 +214,7 @@ def test_migrations_make_the_tables_that_the_program_uses(database: Database) ->
     library = PolicyLibrary(database)
     library.migrate()
     library.migrate()
-    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0001"
+    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0002"
     assert scalar(database, "SELECT revision FROM library_revision") == 0
     with database.read() as connection:
         context = MigrationContext.configure(
@@ -317,7 +317,7 @@ def test_rooms_migrate_side_by_side(library: PolicyLibrary, database: Database, 
     folder = write_migrations(tmp_path / "other", "op.execute('CREATE TABLE a (x INTEGER)')")
     database.migrate(folder, "version_other")
     assert scalar(database, "SELECT version_num FROM version_other") == "1"
-    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0001"
+    assert scalar(database, "SELECT version_num FROM alembic_version_library") == "0002"
 
 
 def test_a_database_of_a_newer_program_is_refused(database: Database, tmp_path: Path) -> None:

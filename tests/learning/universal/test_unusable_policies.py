@@ -209,7 +209,8 @@ def test_what_a_training_made_is_verified_before_it_is_registered(make_policy, m
             trained(how, monkeypatch, data)
     assert trained(lambda _sound: None, monkeypatch, data).artifact is None
 
-    register = next(kind for kind in job_kinds(library, ContainerLimits()) if kind.name == TRAIN).on_success
+    kinds = job_kinds(library, ContainerLimits(), None, None)
+    register = next(kind for kind in kinds if kind.name == TRAIN).on_success
 
     class Job:
         kind, id, payload = TRAIN, "0" * 32, {"problem": problem_to_record(task()), "name": "x"}
