@@ -83,7 +83,7 @@ def train_universal(
     interrupted goes on where it stopped.
     """
     # Loads torch, which the other commands need not wait for.
-    from app.learning.universal import production  # noqa: PLC0415 - slow to load
+    from app.learning.universal.training import production  # noqa: PLC0415 - slow to load
 
     with bar("policies for every size", total=1.0) as advance:
 
@@ -113,7 +113,7 @@ def export(
         digest = hashlib.sha256(data).hexdigest()
         if format is ExportFormat.ONNX:
             # Loads torch, which the other commands need not wait for.
-            from app.learning.export import to_onnx  # noqa: PLC0415 - slow to load
+            from app.learning.checkpoints.export import to_onnx  # noqa: PLC0415 - slow to load
 
             data = to_onnx(data)
         out.write_bytes(data)

@@ -29,8 +29,8 @@ from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import Deadline, never
 
 # The learners are named, not imported, so that this room does not depend on them.
-_TRANSFER = "app.learning.universal.warm_up:warm_up"
-_PRELOAD = "app.learning.source_policies:preload"
+_TRANSFER = "app.learning.universal.request.warm_up:warm_up"
+_PRELOAD = "app.learning.checkpoints.source_policies:preload"
 
 _LARGEST_TRIED = (1000, 2000)
 """UAVs and areas of the problem on which the warm-up tries how long answers take, at most."""

@@ -27,7 +27,7 @@ from app.solvers.stop import Deadline
 
 _GREEDY = "greedy"
 
-_VERIFY = "app.learning.checkpoint:verify"
+_VERIFY = "app.learning.checkpoints.checkpoint:verify"
 """Named, as the algorithms are, so that this room does not depend on the learners."""
 
 answer_time = AnswerTime()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from app.domain.errors import NoCompatibleSource
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.learning.universal.effort import roll_out_work
+from app.learning.universal.episodes.effort import roll_out_work
 from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.explain import rewards_of
 from app.simulation.simulator import ALLOWED, new_episodes
@@ -29,7 +29,7 @@ from app.solvers.protocol import (
 from app.solvers.stop import share_of_time
 
 _WORK_A_SECOND = 2e7
-"""Of :func:`~app.learning.universal.effort.roll_out_work`, on one core; a guess, the deadline holds."""
+"""Of :func:`~app.learning.universal.episodes.effort.roll_out_work`, one core; a guess, the deadline holds."""
 
 _POLICY_SHARE = 0.03
 """Of the time limit, at most, that goes to the policy's roll-outs."""
@@ -85,7 +85,7 @@ class Auto:
         self, problem: Problem, arrays: ProblemArrays, seed: int, stop: StopCriterion
     ) -> tuple[Integers, SourcePolicy] | None:
         """Roll the nearest policy of the library out; None where there is none for every size."""
-        from app.learning.universal.starts import policy_starts  # noqa: PLC0415 - loads torch
+        from app.learning.universal.request.starts import policy_starts  # noqa: PLC0415 - loads torch
 
         try:
             return policy_starts(problem, arrays, self._context.library_url, seed, stop)

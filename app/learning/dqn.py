@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from app.domain.problem import Problem
-from app.learning.episode import Actor
-from app.learning.joint_environment import JointEnvironment
-from app.learning.joint_network import JointNetwork
-from app.learning.learner import Learner
+from app.learning.compute.threads import one_thread
+from app.learning.paper.episode import Actor
+from app.learning.paper.joint_environment import JointEnvironment
+from app.learning.paper.joint_network import JointNetwork
+from app.learning.paper.learner import Learner
+from app.learning.paper.random_streams import random_streams
+from app.learning.paper.replay_buffer import ReplayBuffer
+from app.learning.paper.trainer import Incumbent, Trainer
 from app.learning.parameters import DqnParameters
 from app.learning.qmix import require_memory
-from app.learning.random_streams import random_streams
-from app.learning.replay_buffer import ReplayBuffer
-from app.learning.threads import one_thread
-from app.learning.trainer import Incumbent, Trainer
 from app.solvers.protocol import Report, Solution, SolverContext, StopCriterion
 
 

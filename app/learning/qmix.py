@@ -1,22 +1,22 @@
-"""QMIX from scratch: Algorithm 1, or in service mode :mod:`app.learning.universal.scratch`."""
+"""QMIX from scratch: Algorithm 1, or in service mode :mod:`app.learning.universal.request.scratch`."""
 
 from __future__ import annotations
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
-from app.learning.architecture import NetworkSizes, QmixConfig
-from app.learning.checkpoint import encode
-from app.learning.checkpoint_time import TimeForCheckpoint
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.learner import Learner
-from app.learning.networks import QmixNetwork
+from app.learning.checkpoints.checkpoint import encode
+from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.compute.threads import one_thread
+from app.learning.paper.architecture import NetworkSizes, QmixConfig
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
+from app.learning.paper.learner import Learner
+from app.learning.paper.networks import QmixNetwork
+from app.learning.paper.random_streams import RandomStreams, random_streams
+from app.learning.paper.replay_buffer import ReplayBuffer
+from app.learning.paper.trainer import Incumbent, Trainer, Training
 from app.learning.parameters import LearningParameters, QmixParameters, TableParameters
-from app.learning.random_streams import RandomStreams, random_streams
-from app.learning.replay_buffer import ReplayBuffer
-from app.learning.threads import one_thread
-from app.learning.trainer import Incumbent, Trainer, Training
-from app.learning.universal.scratch import UniversalScratch, fits
+from app.learning.universal.request.scratch import UniversalScratch, fits
 from app.simulation.arrays import compile_problem
 from app.solvers.protocol import Report, Solution, SolverContext, StopCriterion
 
@@ -73,7 +73,7 @@ def train(
     Parameters
     ----------
     problem, parameters, streams, stop, report
-        As in :class:`~app.learning.trainer.Trainer`.
+        As in :class:`~app.learning.paper.trainer.Trainer`.
     network
         Networks for a problem of this size.
     """

@@ -17,7 +17,7 @@ import numpy as np
 from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import read_metadata, with_name
+from app.learning.checkpoints.checkpoint import read_metadata, with_name
 from app.learning.cluster_training import train_on_cluster
 from app.learning.parameters import QmixParameters
 from app.learning.source_training import SEED, train_source

@@ -1,7 +1,7 @@
 """Transfer-QMIX: a source policy of the library, carried over to a problem.
 
 In paper mode Algorithm 2: the networks of the most similar source task of the same size, fine-tuned by
-Algorithm 1. In service mode :mod:`app.learning.universal.transfer`.
+Algorithm 1. In service mode :mod:`app.learning.universal.request.transfer`.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from typing import cast
 import numpy as np
 
 from app.domain.problem import Problem
-from app.learning.checkpoint import encode
-from app.learning.checkpoint_time import TimeForCheckpoint
-from app.learning.networks import QmixNetwork
+from app.learning.checkpoints.checkpoint import encode
+from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.checkpoints.source_policies import Source, SourcePolicies
+from app.learning.compute.threads import one_thread
+from app.learning.paper.networks import QmixNetwork
+from app.learning.paper.random_streams import random_streams
 from app.learning.parameters import TransferQmixParameters
 from app.learning.qmix import metrics_of, qmix_config, require_memory, train
-from app.learning.random_streams import random_streams
-from app.learning.source_policies import Source, SourcePolicies
-from app.learning.threads import one_thread
-from app.learning.universal.best_plan import BestPlan
-from app.learning.universal.effort import effort
-from app.learning.universal.policy import UniversalPolicy
-from app.learning.universal.polishing import polish
-from app.learning.universal.transfer import UniversalTransfer, fill_in
+from app.learning.universal.episodes.best_plan import BestPlan
+from app.learning.universal.episodes.effort import effort
+from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.request.polishing import polish
+from app.learning.universal.request.transfer import UniversalTransfer, fill_in
 from app.simulation.arrays import compile_problem
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import Progress, Report, Solution, SolverContext, StopCriterion

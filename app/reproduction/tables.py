@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.learning.joint_environment import MAX_JOINT_ACTIONS
+from app.learning.paper.joint_environment import MAX_JOINT_ACTIONS
 from app.reproduction.grid import MATERIALS
 from app.reproduction.methods import METHODS, Kind
 from app.reproduction.results import Results, Spread, spread

@@ -165,7 +165,7 @@ class Solution:
     source_policy
         The transferred policy, if any.
     checkpoint
-        What was learned, as a checkpoint of :mod:`app.learning.checkpoint`, or None.
+        What was learned, as a checkpoint of :mod:`app.learning.checkpoints.checkpoint`, or None.
     proof
         How good the plan is, if the algorithm knows; of plans that unload greedily.
     answered_by

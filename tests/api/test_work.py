@@ -18,10 +18,10 @@ from app.domain.records import problem_from_record, problem_to_record
 from app.jobs import work
 from app.jobs.model import BEST_KNOWN
 from app.jobs.work_context import CANCEL, WorkContext, new_control
-from app.learning.checkpoint import encode
+from app.learning.checkpoints.checkpoint import encode
 from app.learning.parameters import QmixParameters
-from app.learning.universal.architecture import UniversalConfig
-from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.settings import Settings
 from policy_store.database import Database

@@ -10,15 +10,15 @@ import numpy as np
 import torch
 from numba import njit
 
-from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
-from app.learning.universal.observation import FORBIDDEN, look, look_again, new_outlook, observe
-from app.learning.universal.rollout import Played
-from app.learning.universal.unfolding import Turns
+from app.learning.universal.episodes.observation import FORBIDDEN, look, look_again, new_outlook, observe
+from app.learning.universal.episodes.rollout import Played
+from app.learning.universal.episodes.unfolding import Turns
+from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.simulation.simulator import act, end_step, new_episodes
 
 
 def unfold_at_once(arrays, problem, plans):
-    """Like :func:`app.learning.universal.unfolding.unfold`, but for what each UAV sees."""
+    """Like :func:`app.learning.universal.episodes.unfolding.unfold`, but for what each UAV sees."""
     episodes, outlook = new_episodes(arrays, len(plans), problem), new_outlook(arrays, len(plans))
     m, n, _ = arrays.shape
     most = plans.size
@@ -39,7 +39,7 @@ def unfold_at_once(arrays, problem, plans):
 
 @torch.inference_mode()
 def play_at_once(agent, arrays, problem, rng=None):
-    """Like :func:`app.learning.universal.rollout.play`, but all UAVs of a step decide on the same state."""
+    """Like :func:`app.learning.universal.episodes.rollout.play`; a step's UAVs decide on the same state."""
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
     episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)

@@ -42,21 +42,21 @@ sys.path[:0] = [str(Path(__file__).parents[2])]
 
 from at_once import play_at_once, unfold_at_once  # noqa: E402
 
-from app.learning.architecture import QmixConfig  # noqa: E402
-from app.learning.environment import SwarmEnvironment  # noqa: E402
-from app.learning.episode import Actor  # noqa: E402
-from app.learning.learner import Learner as PaperLearner  # noqa: E402
-from app.learning.networks import QmixNetwork  # noqa: E402
-from app.learning.replay_buffer import Batch as PaperBatch  # noqa: E402
-from app.learning.universal.architecture import UniversalConfig  # noqa: E402
-from app.learning.universal.curriculum import Shard  # noqa: E402
-from app.learning.universal.demonstrations import demonstrate, read_shard  # noqa: E402
-from app.learning.universal.learner import Learner, make_batch  # noqa: E402
-from app.learning.universal.mixer import UniversalMixer  # noqa: E402
-from app.learning.universal.network import UniversalAgent  # noqa: E402
-from app.learning.universal.optimiser import adam, muon  # noqa: E402
-from app.learning.universal.rollout import play  # noqa: E402
-from app.learning.universal.unfolding import unfold  # noqa: E402
+from app.learning.paper.architecture import QmixConfig  # noqa: E402
+from app.learning.paper.environment import SwarmEnvironment  # noqa: E402
+from app.learning.paper.episode import Actor  # noqa: E402
+from app.learning.paper.learner import Learner as PaperLearner  # noqa: E402
+from app.learning.paper.networks import QmixNetwork  # noqa: E402
+from app.learning.paper.replay_buffer import Batch as PaperBatch  # noqa: E402
+from app.learning.universal.episodes.rollout import play  # noqa: E402
+from app.learning.universal.episodes.unfolding import unfold  # noqa: E402
+from app.learning.universal.network.agent import UniversalAgent  # noqa: E402
+from app.learning.universal.network.architecture import UniversalConfig  # noqa: E402
+from app.learning.universal.network.mixer import UniversalMixer  # noqa: E402
+from app.learning.universal.training.curriculum import Shard  # noqa: E402
+from app.learning.universal.training.demonstrations import demonstrate, read_shard  # noqa: E402
+from app.learning.universal.updates.learner import Learner, make_batch  # noqa: E402
+from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
 from app.simulation.arrays import ProblemArrays  # noqa: E402
 from app.simulation.explain import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402

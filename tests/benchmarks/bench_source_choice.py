@@ -30,8 +30,8 @@ sys.path[:0] = [str(Path(__file__).parents[2])]
 
 from library_on_trial import library_of, policies_for_every_size  # noqa: E402
 
+from app.learning.checkpoints.source_policies import SHORTLIST, SourcePolicies  # noqa: E402
 from app.learning.parameters import TransferQmixParameters  # noqa: E402
-from app.learning.source_policies import SHORTLIST, SourcePolicies  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
 from app.library.description import task_description  # noqa: E402
 from app.simulation.explain import reward_of  # noqa: E402

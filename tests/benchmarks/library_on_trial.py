@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.learning.universal.architecture import QMIX_UNIVERSAL_1
+from app.learning.universal.network.architecture import QMIX_UNIVERSAL_1
 from app.library.seeding import add_policies, read_policies, shipped_policies
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary

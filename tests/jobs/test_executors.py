@@ -17,8 +17,8 @@ from app.jobs.model import JobStatus, Progress
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.learning.train_library import source_tasks, train_library
-from app.learning.universal import production
-from app.learning.universal.production import Production, UniversalTrainingParameters
+from app.learning.universal.training import production
+from app.learning.universal.training.production import Production, UniversalTrainingParameters
 from app.simulation.generator import FAMILIES
 from policy_store.database import Database
 

@@ -7,13 +7,13 @@ import pytest
 import torch
 
 from app.domain.problem import Problem
-from app.learning.architecture import NetworkSizes
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.exploration import EpsilonSchedule
-from app.learning.learner import Learner
-from app.learning.networks import QmixNetwork
-from app.learning.replay_buffer import ReplayBuffer
+from app.learning.paper.architecture import NetworkSizes
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
+from app.learning.paper.exploration import EpsilonSchedule
+from app.learning.paper.learner import Learner
+from app.learning.paper.networks import QmixNetwork
+from app.learning.paper.replay_buffer import ReplayBuffer
 from app.simulation.generator import generate
 
 ALWAYS_RANDOM = EpsilonSchedule(1.0, 1.0, 1)

@@ -7,12 +7,12 @@ from safetensors.torch import load, save
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
-from app.learning.architecture import QmixConfig
-from app.learning.checkpoint import decode, encode, verify
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.learner import Learner
-from app.learning.networks import QmixNetwork
+from app.learning.checkpoints.checkpoint import decode, encode, verify
+from app.learning.paper.architecture import QmixConfig
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
+from app.learning.paper.learner import Learner
+from app.learning.paper.networks import QmixNetwork
 from app.learning.parameters import QmixParameters
 from app.library.entries import new_policy
 from app.simulation.generator import generate

@@ -10,7 +10,7 @@ from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
 from app.learning.dqn import Dqn
-from app.learning.joint_environment import MAX_JOINT_ACTIONS, JointEnvironment, count_joint_actions
+from app.learning.paper.joint_environment import MAX_JOINT_ACTIONS, JointEnvironment, count_joint_actions
 from app.learning.parameters import DqnParameters
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext

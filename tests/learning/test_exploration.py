@@ -7,8 +7,8 @@ from referee import replay
 
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.learning.environment import SwarmEnvironment
-from app.learning.exploration import EpsilonSchedule
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.exploration import EpsilonSchedule
 from app.simulation.arrays import compile_problem
 from app.simulation.simulator import allowed_actions, new_episodes
 

@@ -12,21 +12,21 @@ from typer.testing import CliRunner
 
 import app.learning
 from app.cli import application
-from app.learning.checkpoint import decode
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.export import ExtraNotInstalled, to_onnx
+from app.learning.checkpoints.checkpoint import decode
+from app.learning.checkpoints.export import ExtraNotInstalled, to_onnx
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
-from app.learning.universal.architecture import (
+from app.learning.universal.episodes.observation import look, look_again, new_outlook, observe, scales
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.network.architecture import (
     OWN_FEATURES,
     PAIR_FEATURES,
     QMIX_UNIVERSAL_1,
     RIVAL_FEATURES,
 )
-from app.learning.universal.observation import look, look_again, new_outlook, observe, scales
-from app.learning.universal.on_board import OWN_NAMES, PAIR_NAMES, RIVAL_NAMES, UniversalOnBoard
-from app.learning.universal.rollout import play
+from app.learning.universal.network.on_board import OWN_NAMES, PAIR_NAMES, RIVAL_NAMES, UniversalOnBoard
 from app.library.seeding import shipped_policies
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate

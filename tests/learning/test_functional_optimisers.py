@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from app.learning.functional_optimisers import AdamW, RMSprop
+from app.learning.compute.functional_optimisers import AdamW, RMSprop
 
 
 def weights_after(make, seed, skip_one):

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from app.learning import kernels
+from app.learning.compute import kernels
 
 
 def single(values):

@@ -5,9 +5,9 @@ import pytest
 import torch
 from stopping import at_once
 
-from app.learning import learner as learner_module
-from app.learning.learner import Learner
-from app.learning.replay_buffer import Batch
+from app.learning.paper import learner as learner_module
+from app.learning.paper.learner import Learner
+from app.learning.paper.replay_buffer import Batch
 
 GAMMA = 0.9
 

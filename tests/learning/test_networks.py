@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn.functional import elu, one_hot
 
-from app.learning.architecture import NetworkSizes, QmixConfig, expected_tensors
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.mixer import Mixer
-from app.learning.networks import QmixNetwork
+from app.learning.paper.architecture import NetworkSizes, QmixConfig, expected_tensors
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
+from app.learning.paper.mixer import Mixer
+from app.learning.paper.networks import QmixNetwork
 
 SIZES = NetworkSizes(n_agents=3, n_actions=4, own_features=5, common_features=7)
 

@@ -1,9 +1,9 @@
 import numpy as np
 from problems import random_problem
 
-from app.learning.architecture import TARGET_FIELDS, UAV_FIELDS
-from app.learning.environment import SwarmEnvironment
-from app.learning.observations import features_of, write_states
+from app.learning.paper.architecture import TARGET_FIELDS, UAV_FIELDS
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.observations import features_of, write_states
 from app.library.description import task_description
 from app.simulation.arrays import compile_problem
 from app.simulation.simulator import ALLOWED, act, end_step, new_episodes, verdict

@@ -151,7 +151,9 @@ def test_every_parameter_is_described():
         assert all(field.description for field in model.model_fields.values())
 
 
-@pytest.mark.parametrize("module", ["app.learning", "app.learning.parameters", "app.learning.architecture"])
+@pytest.mark.parametrize(
+    "module", ["app.learning", "app.learning.parameters", "app.learning.paper.architecture"]
+)
 def test_is_imported_without_torch_and_compiled_code(module):
     code = f"import sys, {module}; sys.exit(any(name in sys.modules for name in ('torch', 'numba')))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

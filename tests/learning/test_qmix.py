@@ -12,7 +12,7 @@ from stopping import When
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import decode, verify
+from app.learning.checkpoints.checkpoint import decode, verify
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
 from app.simulation.generator import generate

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.learning.recurrence import gru
+from app.learning.paper.recurrence import gru
 
 
 @pytest.mark.parametrize(("steps", "rows", "hidden"), [(1, 1, 1), (2, 3, 5), (5, 33, 64), (7, 10, 17)])

@@ -1,9 +1,9 @@
 import numpy as np
 import torch
 
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor, EpisodeRecord
-from app.learning.replay_buffer import ReplayBuffer
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor, EpisodeRecord
+from app.learning.paper.replay_buffer import ReplayBuffer
 
 NO_DRAWS = 0.999
 

@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 from app.domain.records import problem_from_record
-from app.learning.checkpoint import decode, verify
+from app.learning.checkpoints.checkpoint import decode, verify
 from app.learning.train_library import (
     PAPER_SHAPES,
     example_shapes,

@@ -7,14 +7,14 @@ from stopping import When, at_once
 
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.learning.checkpoint_time import TimeForCheckpoint
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
-from app.learning.learner import Learner
+from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
+from app.learning.paper.learner import Learner
+from app.learning.paper.random_streams import random_streams
+from app.learning.paper.replay_buffer import ReplayBuffer
+from app.learning.paper.trainer import Incumbent, Trainer
 from app.learning.parameters import TableParameters, TransferQmixParameters
-from app.learning.random_streams import random_streams
-from app.learning.replay_buffer import ReplayBuffer
-from app.learning.trainer import Incumbent, Trainer
 from app.simulation.explain import reward_of
 from app.solvers.stop import never
 

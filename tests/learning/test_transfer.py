@@ -8,9 +8,9 @@ from stopping import at_once
 
 from app.domain.errors import InvalidParameters, NoCompatibleSource
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import decode
-from app.learning.environment import SwarmEnvironment
-from app.learning.episode import Actor
+from app.learning.checkpoints.checkpoint import decode
+from app.learning.paper.environment import SwarmEnvironment
+from app.learning.paper.episode import Actor
 from app.learning.parameters import QmixParameters, TransferQmixParameters
 from app.learning.qmix import Qmix
 from app.learning.transfer import TransferQmix

@@ -11,15 +11,15 @@ import torch
 from torch import nn
 
 from app.domain.plan import Plan
-from app.learning.agent_network import AgentNetwork
-from app.learning.architecture import NetworkSizes
-from app.learning.episode import Actor
-from app.learning.learner import Learner
-from app.learning.networks import QmixNetwork
+from app.learning.paper.agent_network import AgentNetwork
+from app.learning.paper.architecture import NetworkSizes
+from app.learning.paper.episode import Actor
+from app.learning.paper.learner import Learner
+from app.learning.paper.networks import QmixNetwork
+from app.learning.paper.random_streams import random_streams
+from app.learning.paper.replay_buffer import ReplayBuffer
+from app.learning.paper.trainer import Incumbent, Trainer
 from app.learning.parameters import TableParameters
-from app.learning.random_streams import random_streams
-from app.learning.replay_buffer import ReplayBuffer
-from app.learning.trainer import Incumbent, Trainer
 from app.solvers.stop import never
 
 SAFE = np.full((2, 2), 7.0)

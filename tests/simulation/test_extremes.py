@@ -10,8 +10,8 @@ from referee import replay
 
 from app.domain.problem import MAX_MAGNITUDE, MIN_MAGNITUDE, UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
-from app.learning.universal.observation import look, new_outlook, observe
+from app.learning.universal.episodes.observation import look, new_outlook, observe
+from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.library.description import task_description
 from app.library.summary import task_summary
 from app.simulation.arrays import compile_problem

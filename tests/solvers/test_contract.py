@@ -10,10 +10,10 @@ from stopping import at_once
 
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import encode
+from app.learning.checkpoints.checkpoint import encode
 from app.learning.parameters import QmixParameters
-from app.learning.universal.architecture import UniversalConfig
-from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.simulation.explain import reward_of
 from app.simulation.generator import generate

@@ -8,12 +8,12 @@ from referee import replay
 from stopping import After
 
 from app.domain.records import problem_to_record
-from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES
-from app.learning.universal.best_plan import BestPlan
-from app.learning.universal.fine_tuning import FineTuning
-from app.learning.universal.learner import evaluate, make_batch
-from app.learning.universal.rollout import play
-from app.learning.universal.unfolding import unfold
+from app.learning.universal.episodes.best_plan import BestPlan
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES
+from app.learning.universal.request.fine_tuning import FineTuning
+from app.learning.universal.updates.learner import evaluate, make_batch
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers.stop import never

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 import torch
 
-from app.learning.universal.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES, UniversalConfig
-from app.learning.universal.inference import ask, ask_together, attention_bias, compile_agent
-from app.learning.universal.policy import UniversalPolicy
+from app.learning.universal.network.architecture import (
+    OWN_FEATURES,
+    PAIR_FEATURES,
+    RIVAL_FEATURES,
+    UniversalConfig,
+)
+from app.learning.universal.network.inference import ask, ask_together, attention_bias, compile_agent
+from app.learning.universal.network.policy import UniversalPolicy
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from app.domain.plan import Plan
 from app.domain.problem import Objective
-from app.learning.universal.rollout import play
+from app.learning.universal.episodes.rollout import play
 from app.simulation.arrays import compile_problem, stack
 from app.simulation.generator import generate
 

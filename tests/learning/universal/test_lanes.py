@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from app.learning.universal.lanes import helpers, in_lanes, lanes
+from app.learning.universal.network.parallel import helpers, in_lanes, lanes
 
 
 @pytest.mark.parametrize("spare", [-1, 0, 1, 7])

@@ -7,11 +7,11 @@ import pytest
 import torch
 from stopping import After
 
-from app.learning.universal.curriculum import Shard
-from app.learning.universal.demonstrations import demonstrate
-from app.learning.universal.learner import Learner, evaluate, joint_values, lambda_returns, make_batch
-from app.learning.universal.rollout import play
-from app.learning.universal.unfolding import unfold
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.training.curriculum import Shard
+from app.learning.universal.training.demonstrations import demonstrate
+from app.learning.universal.updates.learner import Learner, evaluate, joint_values, lambda_returns, make_batch
 from app.simulation.generator import generate
 
 

@@ -4,7 +4,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.learning.universal.mixer import UniversalMixer
+from app.learning.universal.network.mixer import UniversalMixer
 
 WIDTH = 6
 

@@ -2,9 +2,9 @@
 
 import torch
 
-from app.learning.checkpoint import decode
-from app.learning.universal import production
-from app.learning.universal.production import Production, UniversalTrainingParameters
+from app.learning.checkpoints.checkpoint import decode
+from app.learning.universal.training import production
+from app.learning.universal.training.production import Production, UniversalTrainingParameters
 from app.simulation.generator import FAMILIES
 
 PARAMETERS = UniversalTrainingParameters(

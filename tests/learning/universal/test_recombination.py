@@ -6,10 +6,10 @@ from referee import replay
 from stopping import at_once
 
 from app.domain.records import problem_to_record
-from app.learning.universal import recombination
-from app.learning.universal.best_plan import BestPlan
-from app.learning.universal.recombination import Recombination
-from app.learning.universal.rollout import play
+from app.learning.universal.episodes.best_plan import BestPlan
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.request import recombination
+from app.learning.universal.request.recombination import Recombination
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import rewards_of
 from app.simulation.generator import FAMILIES, generate

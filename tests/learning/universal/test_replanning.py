@@ -8,8 +8,8 @@ from referee import replay
 from stopping import at_once
 
 from app.domain.records import problem_to_record
-from app.learning.universal.replanning import groups_of, replan, residual_of, round_of
-from app.learning.universal.rollout import play
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.request.replanning import groups_of, replan, residual_of, round_of
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import rewards_of
 from app.simulation.generator import FAMILIES, generate

@@ -5,8 +5,8 @@ import pytest
 from referee import replay
 
 from app.domain.records import problem_to_record
-from app.learning.universal.rollout import play
-from app.learning.universal.routes import fly_last, fly_routes
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.episodes.routes import fly_last, fly_routes
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate
 from app.simulation.simulator import new_episodes

@@ -11,10 +11,10 @@ from referee import replay
 from stopping import After
 
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import decode, verify
+from app.learning.checkpoints.checkpoint import decode, verify
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
-from app.learning.universal.rollout import play
+from app.learning.universal.episodes.rollout import play
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import reward_of
 from app.simulation.generator import generate

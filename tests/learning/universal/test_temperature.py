@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from app.learning.universal.temperature import Temperature
+from app.learning.universal.episodes.temperature import Temperature
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import rewards_of
 from app.simulation.generator import generate

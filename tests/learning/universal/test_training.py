@@ -8,12 +8,12 @@ import torch
 from referee import replay
 
 from app.domain.records import problem_to_record
-from app.learning.universal import trainer
-from app.learning.universal.architecture import UniversalConfig
-from app.learning.universal.curriculum import SHAPES, Shard, draw_shard
-from app.learning.universal.demonstrations import Series, demonstrate, read_shard, write_shard
-from app.learning.universal.policy import UniversalPolicy
-from app.learning.universal.trainer import Schedule, fit, initial
+from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.training import trainer
+from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
+from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard
+from app.learning.universal.training.trainer import Schedule, fit, initial
 from app.simulation import simulator
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
@@ -98,7 +98,7 @@ def test_learning_rate_rises_and_falls():
 
 def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        "app.learning.universal.demonstrations.draw_shard",
+        "app.learning.universal.training.demonstrations.draw_shard",
         lambda rng, families: Shard(2, 4, [generate("uniform", 2, 4, 2, rng) for _ in range(3)], moves=500),
     )
     first, second = tmp_path / "a", tmp_path / "b"

@@ -12,15 +12,15 @@ from stopping import After
 
 from app.domain.errors import InvalidParameters, NoCompatibleSource, ProblemTooLarge
 from app.domain.records import problem_to_record
-from app.learning.checkpoint import decode, encode, verify
+from app.learning.checkpoints.checkpoint import decode, encode, verify
+from app.learning.checkpoints.source_policies import SHORTLIST, preload
 from app.learning.parameters import MAX_SAMPLES, QmixParameters, TransferQmixParameters
 from app.learning.qmix import Qmix
-from app.learning.source_policies import SHORTLIST, preload
 from app.learning.transfer import TransferQmix
-from app.learning.universal.effort import effort
-from app.learning.universal.policy import UniversalPolicy
-from app.learning.universal.rollout import play
-from app.learning.universal.transfer import fill_in
+from app.learning.universal.episodes.effort import effort
+from app.learning.universal.episodes.rollout import play
+from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.request.transfer import fill_in
 from app.library.entries import new_policy
 from app.library.summary import task_summary
 from app.simulation.arrays import compile_problem
@@ -97,7 +97,7 @@ def nearest(problem):
 @pytest.fixture
 def one_order(monkeypatch):
     """UAVs act in the order of their indices only."""
-    monkeypatch.setattr("app.learning.universal.effort._ORDERS", 1)
+    monkeypatch.setattr("app.learning.universal.episodes.effort._ORDERS", 1)
 
 
 @pytest.mark.parametrize(("tried", "given"), [(2, {}), (SHORTLIST, {"samples": 1})])

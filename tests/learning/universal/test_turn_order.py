@@ -4,8 +4,14 @@ import numpy as np
 from referee import replay
 
 from app.domain.records import problem_to_record
-from app.learning.universal.rollout import play, play_in_orders
-from app.learning.universal.turn_order import draw_orders, reorder, reorder_plans, restore_plans, some_orders
+from app.learning.universal.episodes.rollout import play, play_in_orders
+from app.learning.universal.episodes.turn_order import (
+    draw_orders,
+    reorder,
+    reorder_plans,
+    restore_plans,
+    some_orders,
+)
 from app.simulation import simulator
 from app.simulation.arrays import compile_problem, stack
 from app.simulation.generator import generate

@@ -17,15 +17,15 @@ from app.domain.records import problem_from_record, problem_to_record
 from app.jobs import work
 from app.jobs.model import WorkResult
 from app.jobs.work_context import WorkContext
-from app.learning.checkpoint import encode, read_metadata, verify
+from app.learning.checkpoints.checkpoint import encode, read_metadata, verify
+from app.learning.checkpoints.source_policies import SourcePolicies
 from app.learning.parameters import QmixParameters, TransferQmixParameters
 from app.learning.qmix import Qmix, qmix_config
-from app.learning.source_policies import SourcePolicies
 from app.learning.transfer import TransferQmix
-from app.learning.universal import fine_tuning
-from app.learning.universal.architecture import QMIX_UNIVERSAL_1
-from app.learning.universal.policy import UniversalPolicy
-from app.learning.universal.starts import policy_starts
+from app.learning.universal.network.architecture import QMIX_UNIVERSAL_1
+from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.request import fine_tuning
+from app.learning.universal.request.starts import policy_starts
 from app.library.entries import new_policy
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate

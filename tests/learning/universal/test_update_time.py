@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.learning.universal.architecture import UniversalConfig
-from app.learning.universal.fine_tuning import FineTuning
-from app.learning.universal.update_time import UpdateTime
+from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.request.fine_tuning import FineTuning
+from app.learning.universal.updates.update_time import UpdateTime
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan

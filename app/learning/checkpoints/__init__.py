@@ -1,0 +1,1 @@
+"""Policies as bytes, and the policies that a library has: reading, checking, choosing, exporting."""

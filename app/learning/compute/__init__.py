@@ -1,0 +1,1 @@
+"""What learning runs on: threads, device, compiled kernels, optimisers."""

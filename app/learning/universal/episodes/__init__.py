@@ -1,0 +1,1 @@
+"""Playing with the networks for every size: what a UAV observes, its turns, roll-outs, routes."""

@@ -1,0 +1,373 @@
+"""What a UAV sees at its turn, whatever the size of the problem: one row a target, and one of its own.
+
+Every number is a ratio: distances over the extent, rewards over the largest level, times over the time it
+takes a UAV of mean speed to cross the extent, amounts over other amounts. So nothing depends on units, and
+nothing depends on how UAVs, targets or materials are numbered, but for the order in which UAVs act.
+
+What a UAV must know of the others to fill its rows: where they are, what they carry, how far they can still
+fly, and that they have not returned. It is the same for all UAVs and can be broadcast once a turn.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from app.learning.compute.kernels import Float32s
+from app.learning.universal.network.architecture import RIVAL_FEATURES
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.simulator import (
+    ALLOWED,
+    Episodes,
+    compiled,
+    farthest,
+    latest,
+    left_of,
+    leg_home,
+    leg_to,
+    verdict,
+)
+
+FOLLOW_UPS = 16
+"""Near targets considered for the visit after the next."""
+
+LARGEST_LEVEL = 1e6
+"""Bound of the level of a target that needs nothing, against those that do: keeps single precision finite."""
+
+FORBIDDEN = -np.inf
+"""Value of a visit that is not allowed."""
+
+
+class Outlook(NamedTuple):
+    """What each episode's UAVs could earn at each target now; kept up to date turn by turn.
+
+    Attributes
+    ----------
+    extent, level, time
+        (P,) scales of each problem: distances, rewards, times.
+    near
+        (P, N, L) the targets nearest to each target.
+    net
+        (B, M, N) reward of a visit now; FORBIDDEN where it is not allowed.
+    unloaded
+        (B, M, N) amounts it would unload, all materials together.
+    first, second
+        (M,) scratch: the best and the second best of each UAV's visits.
+    """
+
+    extent: Floats
+    level: Floats
+    time: Floats
+    near: Integers
+    net: Floats
+    unloaded: Floats
+    first: Floats
+    second: Floats
+
+
+def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
+    """Return what distances, rewards and times are divided by, (P,) each; never 0."""
+    far = np.maximum(arrays.start_target.max(axis=(1, 2)), arrays.between.max(axis=(1, 2)))
+    extent = np.maximum(np.maximum(far, arrays.home.max(axis=(1, 2))), arrays.start_home.max(axis=1))
+    extent = np.where(extent > 0, extent, 1.0)
+    level = np.where(arrays.need_total > 0, arrays.level, 0.0).max(axis=1)
+    flying = ~arrays.ret
+    speed = np.where(flying, arrays.speed, 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
+    return extent, np.where(level > 0, level, 1.0), extent / np.where(speed > 0, speed, 1.0)
+
+
+def new_outlook(arrays: ProblemArrays, batch: int) -> Outlook:
+    """Make the outlook of `batch` episodes; :func:`look` fills it.
+
+    Parameters
+    ----------
+    arrays
+        A stack of P problems.
+    batch
+        B.
+    """
+    m, n, _ = arrays.shape
+    extent, level, time = scales(arrays)
+    length = max(1, min(FOLLOW_UPS, n - 1))
+    between = np.where(arrays.need_total[:, None, :] > 0, arrays.between, np.inf)
+    between[:, np.arange(n), np.arange(n)] = np.inf
+    near = np.argsort(between, axis=2, kind="stable")[:, :, :length]
+    return Outlook(
+        extent=extent,
+        level=level,
+        time=time,
+        near=np.ascontiguousarray(near, dtype=np.int64),
+        net=np.empty((batch, m, n)),
+        unloaded=np.empty((batch, m, n)),
+        first=np.empty(m),
+        second=np.empty(m),
+    )
+
+
+@compiled
+def look(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook) -> None:
+    """Work out everything of the outlook for the present state of every episode."""
+    for b in range(episodes.at.shape[0]):
+        for i in range(episodes.at.shape[1]):
+            for j in range(episodes.need.shape[1]):
+                _value(arrays, episodes, outlook, b, i, j)
+
+
+@compiled
+def look_again(
+    arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, action: int
+) -> None:
+    """Bring the outlook up to date after UAV `i` of episode `b` took an action."""
+    for j in range(episodes.need.shape[1]):
+        _value(arrays, episodes, outlook, b, i, j)
+    if action < episodes.need.shape[1]:
+        for other in range(episodes.at.shape[1]):
+            _value(arrays, episodes, outlook, b, other, action)
+
+
+@compiled
+def _value(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, j: int) -> None:
+    p = episodes.problem[b]
+    if verdict(arrays, episodes, b, i, j) != ALLOWED:
+        outlook.net[b, i, j], outlook.unloaded[b, i, j] = FORBIDDEN, 0.0
+        return
+    unloaded = 0.0
+    for k in range(episodes.load.shape[2]):
+        unloaded += min(episodes.load[b, i, k], episodes.need[b, j, k])
+    cost = arrays.weight[p] * leg_to(arrays, episodes, b, i, j)
+    outlook.net[b, i, j] = arrays.level[p, j] * unloaded / arrays.need_total[p, j] - cost
+    outlook.unloaded[b, i, j] = unloaded
+
+
+@compiled
+def squash(x: float) -> float:
+    """Map any number into -1..1, nearly the same around 0."""
+    return x / (1.0 + abs(x))
+
+
+@compiled
+def clip(x: float, low: float, high: float) -> float:
+    """Bound a number."""
+    return min(max(x, low), high)
+
+
+@compiled
+def observe(
+    arrays: ProblemArrays,
+    episodes: Episodes,
+    outlook: Outlook,
+    b: int,
+    i: int,
+    pair: Float32s,
+    own: Float32s,
+    rivals: Float32s,
+) -> None:
+    """Write what UAV `i` of episode `b` sees at its turn.
+
+    Parameters
+    ----------
+    arrays, episodes, outlook
+        The outlook is up to date.
+    b, i
+        Episode and UAV; it has not returned.
+    pair
+        (N, PAIR_FEATURES), overwritten; column 0 says whether the visit is allowed.
+    own
+        (OWN_FEATURES,), overwritten.
+    rivals
+        (N, M, RIVAL_FEATURES), overwritten: what each other UAV could do at each target; all 0 where it could
+        do nothing.
+    """
+    p = episodes.problem[b]
+    m, n = episodes.at.shape[1], episodes.need.shape[1]
+    scale, extent, time = outlook.level[p], outlook.extent[p], outlook.time[p]
+    steps_left = arrays.max_steps[p] - episodes.step[b]
+    load = 0.0
+    for k in range(episodes.load.shape[2]):
+        load += episodes.load[b, i, k]
+    _best_two_of_each(episodes, outlook, b)
+    home_now = leg_home(arrays, episodes, b, i)
+
+    allowed_visits, others_best = 0, 0.0
+    for j in range(n):
+        net = outlook.net[b, i, j]
+        allowed = net > FORBIDDEN
+        allowed_visits += allowed
+        d = leg_to(arrays, episodes, b, i, j)
+        home_then = arrays.home[p, i, j]
+        need = 0.0
+        for k in range(episodes.need.shape[2]):
+            need += episodes.need[b, j, k]
+        unloaded = outlook.unloaded[b, i, j]
+        value = arrays.level[p, j] * unloaded / max(arrays.need_total[p, j], 1e-300)
+        cost = arrays.weight[p] * d
+        reach = episodes.flown[b, i] + d + (home_then if arrays.return_to_base[p] else 0.0)
+        travel = d / arrays.speed[p, i]
+        deadline = arrays.deadline[p, j]
+
+        best, second, rival, able, supply = FORBIDDEN, FORBIDDEN, -1, 0, 0.0
+        for other in range(m):
+            other_net = outlook.net[b, other, j]
+            seen = rivals[j, other]
+            if other == i or other_net <= FORBIDDEN or (other < i and steps_left <= 1):
+                for f in range(RIVAL_FEATURES):
+                    seen[f] = 0.0
+                continue
+            able += 1
+            its_elsewhere = (
+                outlook.second[other] if outlook.first[other] <= other_net else outlook.first[other]
+            )
+            seen[0] = 1.0
+            seen[1] = squash(other_net / scale)
+            seen[2] = squash((other_net - max(its_elsewhere, 0.0)) / scale)
+            seen[3] = outlook.unloaded[b, other, j] / need
+            seen[4] = 1.0 if other > i else 0.0
+            seen[5] = leg_to(arrays, episodes, b, other, j) / extent
+            supply += outlook.unloaded[b, other, j]
+            if other_net > best:
+                best, second, rival = other_net, best, other
+            elif other_net > second:
+                second = other_net
+        regret = 0.0
+        if rival >= 0:
+            elsewhere = outlook.second[rival] if outlook.first[rival] <= best else outlook.first[rival]
+            regret = best - max(elsewhere, 0.0)
+            others_best = max(others_best, best)
+        mine_elsewhere = outlook.second[i] if outlook.first[i] <= net else outlook.first[i]
+        follow_up = _follow_up(arrays, episodes, outlook, b, i, j) if allowed and steps_left > 1 else 0.0
+
+        row = pair[j]
+        row[0] = 1.0 if allowed else 0.0
+        row[1] = d / extent
+        row[2] = squash(cost / scale)
+        row[3] = value / scale
+        row[4] = squash(net / scale) if allowed else -1.0
+        row[5] = unloaded / need if need > 0.0 else 0.0
+        row[6] = unloaded / load if load > 0.0 else 0.0
+        row[7] = need / arrays.need_total[p, j] if arrays.need_total[p, j] > 0.0 else 0.0
+        row[8] = min(arrays.level[p, j] / scale, LARGEST_LEVEL)
+        row[9] = clip((arrays.voyage[p, i] - reach) / extent, -1.0, 3.0)
+        row[10] = home_then / extent
+        row[11] = (d + home_then - home_now) / extent
+        row[12] = 1.0 if deadline < np.inf else 0.0
+        row[13] = (
+            clip((deadline - episodes.clock[b, i] - travel) / time, -2.0, 4.0) if deadline < np.inf else 0.0
+        )
+        row[14] = clip(arrays.service[p, j] / time, 0.0, 4.0)
+        row[15] = clip(travel / time, 0.0, 4.0)
+        row[16] = squash(best / scale) if able > 0 else -1.0
+        row[17] = squash(second / scale) if able > 1 else -1.0
+        row[18] = squash((net - max(best, 0.0)) / scale) if allowed else -1.0
+        row[19] = able / m
+        row[20] = min(supply / need, 1.0) if need > 0.0 else 0.0
+        row[21] = squash(follow_up / scale)
+        row[22] = squash((net + follow_up) / scale) if allowed else -1.0
+        row[23] = squash(regret / scale)
+        row[24] = 1.0 if rival > i else 0.0
+        row[25] = squash((net - max(mine_elsewhere, 0.0)) / scale) if allowed else -1.0
+        row[26] = value / (value + cost) if value > 0.0 else 0.0
+        row[27] = 1.0 if need > 0.0 and unloaded >= need * (1.0 - 1e-9) else 0.0
+        row[28] = 1.0 if load > 0.0 and unloaded >= load * (1.0 - 1e-9) else 0.0
+        row[29] = min(supply / max(need - unloaded, 1e-300), 1.0) if need - unloaded > 0.0 else 1.0
+
+    _observe_self(arrays, episodes, outlook, b, i, own)
+    own[0] = allowed_visits / n
+    own[1] = squash(outlook.first[i] / scale) if allowed_visits > 0 else -1.0
+    own[2] = squash(others_best / scale)
+
+
+@compiled
+def _observe_self(
+    arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, own: Float32s
+) -> None:
+    """Write what does not belong to one target; entries 0 to 2 are the caller's."""
+    p = episodes.problem[b]
+    m, n, materials = episodes.at.shape[1], episodes.need.shape[1], episodes.load.shape[2]
+    scale, extent, time = outlook.level[p], outlook.extent[p], outlook.time[p]
+    steps = arrays.max_steps[p]
+    steps_left = steps - episodes.step[b]
+    load = start_load = most = swarm = 0.0
+    out = 0
+    for other in range(m):
+        carried = 0.0
+        for k in range(materials):
+            carried += episodes.load[b, other, k]
+        if other == i:
+            load = carried
+        if not episodes.ret[b, other]:
+            out += 1
+            swarm += carried
+            most = max(most, carried)
+    needed = covered = 0.0
+    for k in range(materials):
+        start_load += arrays.load[p, i, k]
+        need_k = supply_k = 0.0
+        for j in range(n):
+            need_k += episodes.need[b, j, k]
+        for other in range(m):
+            if not episodes.ret[b, other]:
+                supply_k += episodes.load[b, other, k]
+        needed += need_k
+        covered += min(need_k, supply_k)
+    home_now = leg_home(arrays, episodes, b, i)
+    left = arrays.voyage[p, i] - episodes.flown[b, i]
+    own[3] = load / most if most > 0.0 else 0.0
+    own[4] = load / start_load if start_load > 0.0 else 0.0
+    own[5] = clip(left / extent, 0.0, 4.0)
+    own[6] = home_now / extent
+    own[7] = squash(arrays.weight[p] * home_now / scale) if arrays.charge_return[p] else 0.0
+    own[8] = 1.0 if arrays.charge_return[p] else 0.0
+    own[9] = 1.0 if arrays.return_to_base[p] else 0.0
+    own[10] = steps_left / steps
+    own[11] = 1.0 / steps_left
+    own[12] = 1.0 if steps_left == 1 else 0.0
+    own[13] = clip(episodes.clock[b, i] / time, 0.0, 4.0)
+    own[14] = clip(arrays.speed[p, i] * time / extent, 0.0, 4.0)
+    own[15] = m / (m + n)
+    own[16] = covered / needed if needed > 0.0 else 0.0
+    own[17] = covered / swarm if swarm > 0.0 else 0.0
+    own[18] = squash(arrays.weight[p] * extent / scale)
+    own[19] = out / m
+    own[20] = (i + 0.5) / m
+    own[21] = 1.0 / n
+
+
+@compiled
+def _best_two_of_each(episodes: Episodes, outlook: Outlook, b: int) -> None:
+    """Fill the scratch space with the best and second best visit of every UAV."""
+    for other in range(episodes.at.shape[1]):
+        first, second = FORBIDDEN, FORBIDDEN
+        for j in range(episodes.need.shape[1]):
+            net = outlook.net[b, other, j]
+            if net > first:
+                first, second = net, first
+            elif net > second:
+                second = net
+        outlook.first[other], outlook.second[other] = first, second
+
+
+@compiled
+def _follow_up(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, j: int) -> float:
+    """Reward of the best visit after one to target `j`, 0 or more, by what is needed now."""
+    p = episodes.problem[b]
+    d = leg_to(arrays, episodes, b, i, j)
+    flown = episodes.flown[b, i] + d
+    clock = episodes.clock[b, i] + d / arrays.speed[p, i] + arrays.service[p, j]
+    best = 0.0
+    for q in range(outlook.near.shape[2]):
+        then = outlook.near[p, j, q]
+        leg = arrays.between[p, j, then]
+        reach = flown + leg + (arrays.home[p, i, then] if arrays.return_to_base[p] else 0.0)
+        arrival = clock + leg / arrays.speed[p, i]
+        if reach > farthest(arrays.voyage[p, i]) or arrival > latest(arrays.deadline[p, then]):
+            continue
+        unloaded = 0.0
+        for k in range(episodes.load.shape[2]):
+            load = episodes.load[b, i, k]
+            kept = left_of(load, min(load, episodes.need[b, j, k]), arrays.load[p, i, k])
+            unloaded += min(kept, episodes.need[b, then, k])
+        if unloaded > 0.0:
+            earned = arrays.level[p, then] * unloaded / arrays.need_total[p, then] - arrays.weight[p] * leg
+            best = max(best, earned)
+    return best

@@ -1,0 +1,33 @@
+"""Loading and compiling what a transfer in service mode needs, before anybody waits for it."""
+
+from __future__ import annotations
+
+from app.domain.problem import Problem
+from app.learning.checkpoints.checkpoint import verify
+from app.learning.checkpoints.source_policies import Source
+from app.learning.compute.threads import one_thread
+from app.learning.parameters import TransferQmixParameters
+from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.request.transfer import UniversalTransfer
+from app.solvers.protocol import SourcePolicy
+from app.solvers.stop import never
+
+
+def warm_up(problem: Problem) -> None:
+    """Transfer a policy that knows nothing, with every part of a request.
+
+    Parameters
+    ----------
+    problem
+        Small; somebody can fly somewhere.
+    """
+    parameters = TransferQmixParameters(samples=2, n_epochs=1, polish_moves=100)
+    policy = UniversalPolicy.of_seed(UniversalConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
+    source = SourcePolicy("", "", 0.0)
+    with one_thread():
+        transfer = UniversalTransfer(problem, parameters, 0, never, lambda _progress: None)
+        solution = transfer.run([Source(source, policy)])
+    if solution.checkpoint is None:
+        raise ValueError("somebody must be able to fly somewhere in the problem")
+    verify(solution.checkpoint, problem)

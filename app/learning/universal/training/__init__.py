@@ -1,0 +1,1 @@
+"""How the shipped policies for every size are made: demonstrations, training, production."""
