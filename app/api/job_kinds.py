@@ -18,7 +18,7 @@ BATCH = "batch"
 TRAIN = "train"
 REGISTER = "register"
 
-_REASONS = FollowUp("app.jobs.work:complete_reasons", {"reasons": "incomplete"})
+_REASONS = FollowUp("app.allocation.tasks:complete_reasons", {"reasons": "incomplete"})
 
 
 def _effort(payload: dict[str, Any]) -> float:
@@ -56,19 +56,19 @@ def job_kinds(
     return [
         JobKind(
             ALLOCATE,
-            "app.jobs.work:allocate",
+            "app.allocation.tasks:allocate",
             "interactive",
-            at_once="app.jobs.work:allocate_at_once",
+            at_once="app.allocation.tasks:allocate_at_once",
             max_run_s=max_run_s,
             effort=_effort,
             follow_up=_REASONS,
         ),
-        JobKind(BATCH, "app.jobs.work:allocate", "batch", max_run_s=max_run_s, follow_up=_REASONS),
-        JobKind(TRAIN, "app.jobs.work:train", "training", add_to_library, max_run_s=max_training_s),
+        JobKind(BATCH, "app.allocation.tasks:allocate", "batch", max_run_s=max_run_s, follow_up=_REASONS),
+        JobKind(TRAIN, "app.allocation.tasks:train", "training", add_to_library, max_run_s=max_training_s),
         # The weights are the job's artifact, and the policy's.
         JobKind(
             REGISTER,
-            "app.jobs.work:register",
+            "app.allocation.tasks:register",
             "interactive",
             add_to_library,
             dropped_fields=frozenset({"checkpoint_base64"}),

@@ -112,7 +112,7 @@ def allocate(
         with open_library(settings) as (library, database):
             seed_library(library, database)
         # Loads compiled code and torch, which a call for help or a mistake need not wait for.
-        from app.jobs import work  # noqa: PLC0415 - slow to load
+        from app.allocation import tasks  # noqa: PLC0415 - as above
 
         with bar(request.algorithm, total=1.0) as advance:
 
@@ -120,7 +120,7 @@ def allocate(
                 advance(progress.fraction, f"best reward {progress.best_reward or 0:.4f}")
 
             context = WorkContext.in_process(report, time_limit_s=request.time_limit_s)
-            result = work.allocate(payload, context).result
+            result = tasks.allocate(payload, context).result
     answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
     sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
 
@@ -131,7 +131,7 @@ def compile_code(
     ] = usable_processors(),
 ) -> None:
     """Make and keep the compiled code that the service's workers load; takes minutes the first time."""
-    from app.jobs.warm_up import compile_all  # noqa: PLC0415 - slow to load
+    from app.allocation.warm_up import compile_all  # noqa: PLC0415 - slow to load
 
     started = time.monotonic()
     compile_all(processes)

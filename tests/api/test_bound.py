@@ -2,12 +2,12 @@
 
 import pytest
 
+from app.allocation import tasks
+from app.allocation.answer_time import AnswerTime
+from app.allocation.time_limit import TimeLimit
 from app.api.openapi_examples import example_problem
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.records import problem_from_record, problem_to_record
-from app.jobs import work
-from app.jobs.answer_time import AnswerTime
-from app.jobs.time_limit import TimeLimit
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.settings import Settings
 
@@ -49,7 +49,7 @@ def test_a_cancelled_search_has_a_bound_too():
     control = new_control()
     control[CANCEL] = 1.0
 
-    result = work.allocate(
+    result = tasks.allocate(
         payload(bound_time_limit_s=5.0), WorkContext(lambda _progress: None, control)
     ).result
 
@@ -79,7 +79,7 @@ def test_more_time_gives_no_higher_bound():
         problem=problem_to_record(to_problem(ProblemModel(**problem), Settings())), bound_time_limit_s=0.01
     )
     context = WorkContext.in_process(lambda _progress: None)
-    quick = work.allocate(given, context).result
-    longer = work.allocate({**given, "bound_time_limit_s": 1.0}, context).result
+    quick = tasks.allocate(given, context).result
+    longer = tasks.allocate({**given, "bound_time_limit_s": 1.0}, context).result
 
     assert quick["bound"] >= longer["bound"] >= longer["reward"]

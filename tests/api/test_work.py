@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from referee import replay
 
+from app.allocation import tasks
 from app.api.openapi_examples import example_problem
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Objective, Problem
 from app.domain.records import problem_from_record, problem_to_record
-from app.jobs import work
 from app.jobs.model import BEST_KNOWN
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.learning.checkpoints.checkpoint import encode
@@ -50,7 +50,7 @@ def test_result_is_json_and_progress_ends_at_its_plan():
     told = []
     context = WorkContext.in_process(told.append)
 
-    done = work.allocate(payload("qmix", QMIX) | {"keep_checkpoint": True}, context)
+    done = tasks.allocate(payload("qmix", QMIX) | {"keep_checkpoint": True}, context)
 
     assert json.loads(json.dumps(done.result, allow_nan=False)) == json.loads(json.dumps(done.result))
     assert done.artifact
@@ -69,7 +69,7 @@ def test_stopped_before_it_began_there_is_still_a_plan(algorithm, parameters):
     control = new_control()
     control[CANCEL] = 1.0
 
-    done = work.allocate(payload(algorithm, parameters), WorkContext(lambda _progress: None, control))
+    done = tasks.allocate(payload(algorithm, parameters), WorkContext(lambda _progress: None, control))
 
     assert done.result["reward"] == pytest.approx(replay(record(), done.result["assignment"])["reward"])
     assert done.result["reward"] >= 0
@@ -78,14 +78,14 @@ def test_stopped_before_it_began_there_is_still_a_plan(algorithm, parameters):
 def test_time_that_is_up_stops_it():
     context = WorkContext.in_process(lambda _progress: None, time_limit_s=0.2)
 
-    done = work.allocate(payload("qmix", {**QMIX, "n_epochs": 10_000_000}), context)
+    done = tasks.allocate(payload("qmix", {**QMIX, "n_epochs": 10_000_000}), context)
 
     assert done.result["history"]["epoch"][-1] < 10_000_000
     replay(record(), done.result["assignment"])
 
 
 def best_plan():
-    done = work.allocate(payload("local_search", {}), WorkContext.in_process(lambda _progress: None))
+    done = tasks.allocate(payload("local_search", {}), WorkContext.in_process(lambda _progress: None))
     return done.result
 
 
@@ -93,7 +93,7 @@ def known(assignment, answered_by="local_search"):
     return {BEST_KNOWN: {"assignment": assignment, "answered_by": answered_by, "best_reward": 1e9}}
 
 
-@pytest.mark.parametrize("answers", [work.allocate, work.allocate_at_once])
+@pytest.mark.parametrize("answers", [tasks.allocate, tasks.allocate_at_once])
 def test_the_best_plan_of_an_earlier_attempt_is_the_least_that_is_answered(answers):
     best = best_plan()
     told = []
@@ -111,10 +111,10 @@ def test_the_best_plan_of_an_earlier_attempt_is_the_least_that_is_answered(answe
 
 def test_a_worse_plan_of_an_earlier_attempt_is_not_answered():
     best, poor = best_plan(), payload("greedy", {})
-    poor = work.allocate(poor, WorkContext.in_process(lambda _progress: None)).result["assignment"]
+    poor = tasks.allocate(poor, WorkContext.in_process(lambda _progress: None)).result["assignment"]
     context = WorkContext.in_process(lambda _progress: None)
 
-    done = work.allocate(payload("local_search", {}) | known(poor, "greedy"), context).result
+    done = tasks.allocate(payload("local_search", {}) | known(poor, "greedy"), context).result
 
     assert (done["reward"], done["answered_by"]) == (best["reward"], "local_search")
 
@@ -139,7 +139,7 @@ def test_a_worse_plan_of_an_earlier_attempt_is_not_answered():
 def test_a_plan_that_is_none_is_not_answered(assignment):
     context = WorkContext.in_process(lambda _progress: None)
 
-    done = work.allocate(payload("greedy", {}) | known(assignment), context).result
+    done = tasks.allocate(payload("greedy", {}) | known(assignment), context).result
 
     assert done["answered_by"] == "greedy"
     replay(record(), done["assignment"])
@@ -147,16 +147,16 @@ def test_a_plan_that_is_none_is_not_answered(assignment):
 
 def test_training_is_registered_by_its_checkpoint():
     paper = payload("qmix", {**QMIX, "mode": "paper"})
-    trained = work.train(paper, WorkContext.in_process(lambda _progress: None))
+    trained = tasks.train(paper, WorkContext.in_process(lambda _progress: None))
     context = WorkContext.in_process(lambda _progress: None)
     text = base64.b64encode(trained.artifact).decode()
-    done = work.register({"name": "x", "problem": record(), "checkpoint_base64": text}, context)
+    done = tasks.register({"name": "x", "problem": record(), "checkpoint_base64": text}, context)
 
     assert done.artifact == trained.artifact
     with pytest.raises(InvalidCheckpoint, match="base64"):
-        work.register({"name": "x", "problem": record(), "checkpoint_base64": text[:-1]}, context)
+        tasks.register({"name": "x", "problem": record(), "checkpoint_base64": text[:-1]}, context)
     with pytest.raises(InvalidCheckpoint):
-        work.register({"name": "x", "problem": record("cyclone-idai"), "checkpoint_base64": text}, context)
+        tasks.register({"name": "x", "problem": record("cyclone-idai"), "checkpoint_base64": text}, context)
 
 
 @pytest.fixture
@@ -185,8 +185,8 @@ def test_after_the_warm_up_nothing_is_compiled_and_the_compiler_of_torch_is_not_
     program = """
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
-from app.jobs import work
-from app.jobs.warm_up import warm_up
+from app.allocation import tasks
+from app.allocation.warm_up import warm_up
 from app.jobs.work_context import WorkContext
 
 def compiled():
@@ -196,7 +196,7 @@ def compiled():
 warm_up()
 before = compiled()
 for payload in json.load(sys.stdin):
-    work.allocate(payload, WorkContext.in_process(lambda progress: None))
+    tasks.allocate(payload, WorkContext.in_process(lambda progress: None))
 loaded = [name for name in ("torch", "torch._dynamo", "sympy") if name in sys.modules]
 print(json.dumps([before, compiled(), loaded]))
 """

@@ -44,10 +44,10 @@ from policy_store.database import Database  # noqa: E402
 
 ASKED_SPEED_UP, ASKED_OVERHEAD_MS = 1.8, 10.0
 KINDS = (
-    JobKind("allocate", "app.jobs.work:allocate", "batch"),
+    JobKind("allocate", "app.allocation.tasks:allocate", "batch"),
     JobKind("nothing", "job_work:nothing", "interactive"),
 )
-WARM_UP = "app.jobs.warm_up:warm_up"
+WARM_UP = "app.allocation.warm_up:warm_up"
 ROWS = ("1 worker here", "2 workers here", "1 node", "2 nodes", "2 nodes, 2 services")
 NOTHING_TIMES = 300
 PARAMETERS: dict[str, dict[str, Any]] = {

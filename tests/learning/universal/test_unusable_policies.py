@@ -11,10 +11,10 @@ from referee import replay
 from safetensors.torch import load, save
 from sqlalchemy import text
 
+from app.allocation import tasks
 from app.api.job_kinds import TRAIN, job_kinds
 from app.domain.errors import InvalidCheckpoint, InvalidParameters, NoCompatibleSource
 from app.domain.records import problem_from_record, problem_to_record
-from app.jobs import work
 from app.jobs.model import WorkResult
 from app.jobs.work_context import WorkContext
 from app.learning.checkpoints.checkpoint import encode, read_metadata, verify
@@ -196,9 +196,9 @@ def test_fine_tuning_that_diverges_is_stopped_and_leaves_a_plan(spoil, monkeypat
 
 
 def trained(how, monkeypatch, data):
-    monkeypatch.setattr(work, "allocate", lambda _payload, _context: WorkResult({}, how(data)))
+    monkeypatch.setattr(tasks, "allocate", lambda _payload, _context: WorkResult({}, how(data)))
     payload = {"problem": problem_to_record(task())}
-    return work.train(payload, WorkContext.in_process(lambda _progress: None))
+    return tasks.train(payload, WorkContext.in_process(lambda _progress: None))
 
 
 def test_what_a_training_made_is_verified_before_it_is_registered(make_policy, monkeypatch, library):
@@ -245,7 +245,7 @@ def test_the_case_that_poisoned_a_library(library):
     context = WorkContext.in_process(lambda _progress: None)
     learning = {**trains["train"]["parameters"], "source": "strange"}
     try:
-        made = work.train({"problem": record(trains["task"]), "parameters": learning, **means}, context)
+        made = tasks.train({"problem": record(trains["task"]), "parameters": learning, **means}, context)
     except InvalidCheckpoint:
         made = WorkResult({}, None)
     if made.artifact is not None:
@@ -253,7 +253,7 @@ def test_the_case_that_poisoned_a_library(library):
         library.add(new_policy("made of it", problem, made.artifact, policy_id="made"))
 
     asked = record(asks)
-    done = work.allocate({"problem": asked, "parameters": asks["parameters"], **means}, context)
+    done = tasks.allocate({"problem": asked, "parameters": asks["parameters"], **means}, context)
     assert replay(asked, done.result["assignment"])["reward"] == pytest.approx(done.result["reward"])
     assert library.get("strange").architecture == QMIX_UNIVERSAL_1
     assert isinstance(

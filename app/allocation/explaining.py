@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from app.allocation.answer_time import AnswerSize, AnswerTime
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.domain.records import to_record
-from app.jobs.answer_time import AnswerSize, AnswerTime
 from app.simulation.explain import explain
 
 REASONS, COMPLETE, PENDING = "reasons", "complete", "pending"

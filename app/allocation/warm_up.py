@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from app.allocation import bounding, tasks
+from app.allocation.answer_time import BOUND
 from app.domain.errors import NoCompatibleSource
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_to_record
-from app.jobs import bounding, work
-from app.jobs.answer_time import BOUND
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
@@ -102,7 +102,7 @@ def _time_bound(problem: Problem) -> None:
         begun = time.perf_counter()
         bounding.bound_answer(problem, 0.0, 1.0, asked)
         took.append(time.perf_counter() - begun)
-    work.answer_time.preparations.tried(BOUND, problem, min(took))
+    tasks.answer_time.preparations.tried(BOUND, problem, min(took))
 
 
 class _NotAtOnce:
@@ -133,7 +133,7 @@ def _time_preparations(algorithm: str, problem: Problem, means: protocol.SolverC
             # A library may be empty, and jobs are then refused as quickly.
             return
         took.append(time.perf_counter() - begun)
-    work.answer_time.preparations.tried(algorithm, problem, min(took))
+    tasks.answer_time.preparations.tried(algorithm, problem, min(took))
 
 
 def compile_all(processes: int) -> None:
@@ -158,9 +158,9 @@ def _do(part: str) -> None:
 
 def _algorithm(name: str) -> None:
     problem = _small_problem()
-    found = work.allocate(_request(problem, name, _PARAMETERS[name]), _unlimited())
+    found = tasks.allocate(_request(problem, name, _PARAMETERS[name]), _unlimited())
     if found.artifact is not None:
-        work.verify(found.artifact, problem)
+        tasks.verify(found.artifact, problem)
 
 
 def _transfer() -> None:
@@ -174,7 +174,7 @@ def _bound() -> None:
 def _unloading() -> None:
     problem = _small_problem()
     planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    work.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
+    tasks.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
 
 
 def _combining() -> None:
@@ -190,10 +190,10 @@ def _geography() -> None:
 
 
 def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
-    """Load and compile what :func:`app.jobs.work.allocate_at_once` needs; see :func:`warm_up`."""
+    """Load and compile what :func:`app.allocation.tasks.allocate_at_once` needs; see :func:`warm_up`."""
     write_in_turns()
     request = _request(_small_problem(), "greedy", {})
-    work.allocate_at_once({**request, "bound_time_limit_s": 1.0}, _unlimited())
+    tasks.allocate_at_once({**request, "bound_time_limit_s": 1.0}, _unlimited())
     _unloading()
     _geography()
     _time_answers(most_uavs, most_targets)
@@ -209,13 +209,13 @@ def _time_answers(most_uavs: int, most_targets: int) -> None:
     planned = replace(largest, objective=replace(largest.objective, unloading="planned"))
     requests = [_request(problem, "greedy", {}) for problem in (largest, planned)]
     for request in requests:
-        work.allocate_at_once(request, _unlimited())
-    work.answer_time.forget()
+        tasks.allocate_at_once(request, _unlimited())
+    tasks.answer_time.forget()
     for request in requests:
         for _ in range(_ANSWERS_TIMED):
-            work.allocate_at_once(request, _unlimited())
+            tasks.allocate_at_once(request, _unlimited())
     # With the reasons too.
-    work.allocate(requests[0], _unlimited())
+    tasks.allocate(requests[0], _unlimited())
 
 
 def _small_problem() -> Problem:

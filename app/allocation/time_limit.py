@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from app.allocation import bounding
+from app.allocation.answer_time import BOUND, AnswerSize, AnswerTime, expected_size
 from app.domain.problem import Problem
-from app.jobs import bounding
-from app.jobs.answer_time import BOUND, AnswerSize, AnswerTime, expected_size
 from app.jobs.work_context import WorkContext
 
 _PREPARING_SHARE = 0.25

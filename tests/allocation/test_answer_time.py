@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.jobs.answer_time import AnswerSize, AnswerTime, expected_size
-from app.jobs.preparation import Preparations
-from app.jobs.time_limit import TimeLimit
+from app.allocation.answer_time import AnswerSize, AnswerTime, expected_size
+from app.allocation.preparation import Preparations
+from app.allocation.time_limit import TimeLimit
 from app.jobs.work_context import DEADLINE, WorkContext, new_control
 from app.simulation.generator import generate
 

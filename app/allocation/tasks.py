@@ -8,17 +8,17 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
+from app.allocation import bounding
+from app.allocation.answer_time import AnswerTime
+from app.allocation.explaining import PENDING, REASONS, account_of
+from app.allocation.found import BestKnown, Found, best_known
+from app.allocation.time_limit import TimeLimit
 from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.domain.records import problem_from_record, to_record
 from app.domain.warnings import problem_warnings
-from app.jobs import bounding
-from app.jobs.answer_time import AnswerTime
-from app.jobs.explaining import PENDING, REASONS, account_of
-from app.jobs.found import BestKnown, Found, best_known
 from app.jobs.model import Progress, WorkResult
-from app.jobs.time_limit import TimeLimit
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
 from app.solvers import protocol

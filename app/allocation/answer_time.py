@@ -11,8 +11,8 @@ from collections.abc import Collection
 from statistics import median_high
 from typing import NamedTuple
 
+from app.allocation.preparation import Preparations
 from app.domain.problem import Problem
-from app.jobs.preparation import Preparations
 
 BOUND = "bound"
 """What the bound is called where algorithms are timed."""
