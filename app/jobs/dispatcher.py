@@ -18,19 +18,19 @@ from typing import Any, TypeVar
 from structlog.contextvars import bind_contextvars
 
 from app.jobs.channel import Channels
-from app.jobs.company import Reactions
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.executor import Execution, Executor
 from app.jobs.follow_up import FollowUps
 from app.jobs.housekeeping import Housekeeping
 from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes, QueueLimit
-from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, JobSummary, Lane, Load, Progress
 from app.jobs.observer import JobObserver
+from app.jobs.overdue import OverdueJobs
+from app.jobs.peers import Reactions
 from app.jobs.recovery import Recovery
 from app.jobs.run import Run, Runs, handed_over
 from app.jobs.settling import Settling
-from app.jobs.shared import company_on
+from app.jobs.shared import peers_on
 from app.jobs.spawning import spawn
 from app.jobs.store import JobStore
 from app.jobs.transitions import Claim
@@ -89,21 +89,21 @@ class Dispatcher:
         self._lanes = Lanes(executor.capacity)
         self._runs, self._clock = Runs(), store.clock
         self._wake = asyncio.Event()
-        self._company = company_on(store.database, owner, lease_s, self._writer, self._runs, channels)
-        self._last_minute = LastMinute(self._answer_at_once, self._clock.now)
+        self._peers = peers_on(store.database, owner, lease_s, self._writer, self._runs, channels)
+        self._overdue = OverdueJobs(self._answer_at_once, self._clock.now)
         self._follow_ups = FollowUps(store.unfinished, self._writer, self._kinds, reserve, self._has_spare)
         self._waiting = Waiting(
             self._lanes,
             self._kinds,
-            None if reserve is None else self._last_minute,
-            self._company,
+            None if reserve is None else self._overdue,
+            self._peers,
             self._wake,
         )
         self._recovery = Recovery(
             store,
             self._writer,
             self._kinds,
-            self._company,
+            self._peers,
             self._waiting,
             partial(self._tell_end, ran_s=None),
         )
@@ -119,7 +119,7 @@ class Dispatcher:
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work."""
         await self._writer.write(self._store.migrate)
-        await self._company.join(
+        await self._peers.join(
             Reactions(
                 self._waiting.heard,
                 self._waiting.forget,
@@ -138,14 +138,14 @@ class Dispatcher:
             await self._reserve.start(self._reserve_ready.set)
         self._wake.set()
         self._dispatching = asyncio.create_task(self._dispatch())
-        keepers = self._house, self._last_minute, self._follow_ups
+        keepers = self._house, self._overdue, self._follow_ups
         self._keeping = [asyncio.create_task(keeper.keep()) for keeper in keepers]
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
         self._accepting = False
         self._wake.set()
-        self._last_minute.end()
+        self._overdue.end()
         self._follow_ups.end()
         self._reserve_ready.set()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
@@ -163,7 +163,7 @@ class Dispatcher:
         self._house.end()
         for task in self._keeping:
             await task
-        await self._company.leave()
+        await self._peers.leave()
         await self._executor.close()
         if self._reserve is not None:
             await self._reserve.close()
@@ -243,7 +243,7 @@ class Dispatcher:
         elif before is JobStatus.RUNNING and (run := self._runs.of(job_id)) is not None:
             run.stop(self._grace_s)
         elif before is JobStatus.RUNNING:
-            self._company.tell_cancelled(job_id)
+            self._peers.tell_cancelled(job_id)
         return self.newest(job)
 
     def load(self) -> Load:
@@ -379,7 +379,7 @@ class Dispatcher:
     def _tell_end(self, job: Job, ran_s: float | None) -> None:
         """Tell everybody who is interested that a job has ended."""
         self._channels.end(job)
-        self._company.tell_ended(job.id)
+        self._peers.tell_ended(job.id)
         self._observer.ended(job, ran_s)
         _log.info(
             "job ended",
@@ -393,7 +393,7 @@ class Dispatcher:
         )
 
     def _has_spare(self) -> bool:
-        return not self._last_minute.busy and sum(self._lanes.running.values()) < self._executor.capacity
+        return not self._overdue.busy and sum(self._lanes.running.values()) < self._executor.capacity
 
     def _give_back(self, lane: Lane) -> None:
         self._lanes.running[lane] -= 1

@@ -6,8 +6,8 @@ import asyncio
 import logging
 from collections.abc import Callable, Collection
 
-from app.jobs.company import Company
 from app.jobs.model import Job
+from app.jobs.peers import Peers
 from app.jobs.run import Run
 from app.jobs.store import JobStore
 from app.jobs.waiting import Waiting
@@ -25,7 +25,7 @@ class Recovery:
         The job table, and its writer.
     kinds
         The names of the kinds of job that this service has.
-    company
+    peers
         The other services.
     waiting
         The jobs that wait.
@@ -38,12 +38,12 @@ class Recovery:
         store: JobStore,
         writer: Writer,
         kinds: Collection[str],
-        company: Company,
+        peers: Peers,
         waiting: Waiting,
         tell_end: Callable[[Job], None],
     ) -> None:
         self._store, self._writer, self._kinds = store, writer, tuple(kinds)
-        self._company, self._waiting = company, waiting
+        self._peers, self._waiting = peers, waiting
         self._tell_end = tell_end
         self._unsettled: list[Run] = []
         self._one_at_a_time = asyncio.Lock()
@@ -74,11 +74,11 @@ class Recovery:
         if job is not None and job.status.finished:
             self._tell_end(job)
         elif job is not None:
-            self._company.tell_waiting(job.lane)
+            self._peers.tell_waiting(job.lane)
             await self.look_after()
 
     async def _recover(self) -> None:
-        changed = await self._writer.write(self._store.recover, self._kinds, self._company.is_alive)
+        changed = await self._writer.write(self._store.recover, self._kinds, self._peers.is_alive)
         for job in changed:
             _log.warning(
                 "a job was left behind by an earlier process",
@@ -87,6 +87,6 @@ class Recovery:
             if job.status.finished:
                 self._tell_end(job)
             else:
-                self._company.tell_waiting(job.lane)
+                self._peers.tell_waiting(job.lane)
         self._waiting.count_anew(await self._writer.write(self._store.waiting))
         self._waiting.watch_anew(await self._writer.write(self._store.deadlines))

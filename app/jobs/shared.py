@@ -12,9 +12,9 @@ import logging
 import time
 
 from app.jobs.channel import Channels, rung
-from app.jobs.company import Alone, Company, Reactions
 from app.jobs.lease import Held, Lease
 from app.jobs.model import LANES, Lane
+from app.jobs.peers import NoPeers, Peers, Reactions
 from app.jobs.reading import Announcements, Database
 from app.jobs.run import Runs
 from app.jobs.writer import Writer
@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 
 class Shared:
-    """The company of services that share a PostgreSQL database.
+    """The services that share a PostgreSQL database with this one.
 
     Parameters
     ----------
@@ -156,15 +156,15 @@ class Shared:
                 await reactions.give_back(job_id, mine.attempt)
 
 
-def company_on(
+def peers_on(
     database: Database,
     owner: str,
     lease_s: float,
     writer: Writer,
     runs: Runs,
     channels: Channels,
-) -> Company:
+) -> Peers:
     """Return whom an owner shares a database with: nobody, or others; see :class:`Shared`."""
     if not database.shared:
-        return Alone(owner)
+        return NoPeers(owner)
     return Shared(database, owner, lease_s, writer, runs, channels)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable, Mapping
 
-from app.jobs.company import Company
 from app.jobs.lanes import Lanes
-from app.jobs.last_minute import LastMinute
 from app.jobs.model import LANES, Job, JobKind, Lane
+from app.jobs.overdue import OverdueJobs
+from app.jobs.peers import Peers
 
 
 class Waiting:
@@ -23,9 +23,9 @@ class Waiting:
         Where the count is kept.
     kinds
         The kinds of job by their names.
-    last_minute
+    overdue
         Told of the jobs that have to be answered when their time is up; None: nobody answers those.
-    company
+    peers
         The other services.
     wake
         Set when there is something to take.
@@ -35,12 +35,12 @@ class Waiting:
         self,
         lanes: Lanes,
         kinds: Mapping[str, JobKind],
-        last_minute: LastMinute | None,
-        company: Company,
+        overdue: OverdueJobs | None,
+        peers: Peers,
         wake: asyncio.Event,
     ) -> None:
         self._lanes, self._kinds = lanes, kinds
-        self._last_minute, self._company = last_minute, company
+        self._overdue, self._peers = overdue, peers
         self._wake = wake
         # Lanes of which something was heard while their queue was looked at.
         self._heard: set[Lane] = set()
@@ -48,22 +48,22 @@ class Waiting:
     def more(self, job: Job, deadline: float | None) -> None:
         """Take note of one more job, and tell the others who could take it."""
         self._lanes.waiting[job.lane] += 1
-        if self._last_minute is not None and deadline is not None and self._answered_at_once(job.kind):
-            self._last_minute.watch(job.id, deadline, self._kinds[job.kind].effort(job.payload))
-        self._company.tell_waiting(job.lane)
+        if self._overdue is not None and deadline is not None and self._answered_at_once(job.kind):
+            self._overdue.watch(job.id, deadline, self._kinds[job.kind].effort(job.payload))
+        self._peers.tell_waiting(job.lane)
         self._wake.set()
 
     def less(self, job: Job) -> None:
         """Take note that a job waits no more."""
-        least = int(self._company.others_may_wait)
+        least = int(self._peers.others_may_wait)
         self._lanes.waiting[job.lane] = max(least, self._lanes.waiting[job.lane] - 1)
         self.forget(job.id)
         self._wake.set()
 
     def forget(self, job_id: str) -> None:
         """Take note that a job, which this service may not know, waits no more."""
-        if self._last_minute is not None:
-            self._last_minute.forget(job_id)
+        if self._overdue is not None:
+            self._overdue.forget(job_id)
 
     def heard(self, lane: Lane) -> None:
         """Take note that another service told of a job."""
@@ -86,8 +86,8 @@ class Waiting:
 
     def watch_anew(self, deadlines: Iterable[tuple[str, str, float]]) -> None:
         """Take over id, kind and deadline of the jobs that wait in the table and have one."""
-        if self._last_minute is not None:
-            self._last_minute.watch_only(
+        if self._overdue is not None:
+            self._overdue.watch_only(
                 {job_id: deadline for job_id, kind, deadline in deadlines if self._answered_at_once(kind)}
             )
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numba import njit
 
-from app.learning.universal.episodes.observation import FORBIDDEN, look, look_again, new_outlook, observe
+from app.learning.universal.episodes.observation import FORBIDDEN, look, look_again, new_gains, observe
 from app.learning.universal.episodes.rollout import Played
 from app.learning.universal.episodes.unfolding import Turns
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -19,7 +19,7 @@ from app.simulation.simulator import act, end_step, new_episodes
 
 def unfold_at_once(arrays, problem, plans):
     """Like :func:`app.learning.universal.episodes.unfolding.unfold`, but for what each UAV sees."""
-    episodes, outlook = new_episodes(arrays, len(plans), problem), new_outlook(arrays, len(plans))
+    episodes, gains = new_episodes(arrays, len(plans), problem), new_gains(arrays, len(plans))
     m, n, _ = arrays.shape
     most = plans.size
     turns = Turns(
@@ -32,7 +32,7 @@ def unfold_at_once(arrays, problem, plans):
         uav=np.empty(most, np.int64),
         reward=np.zeros(plans.shape[:2]),
     )
-    count = _unfold(arrays, episodes, outlook, plans, turns)
+    count = _unfold(arrays, episodes, gains, plans, turns)
     columns = {name: column[:count] for name, column in turns._asdict().items() if name != "reward"}
     return Turns(**columns, reward=turns.reward)
 
@@ -42,10 +42,10 @@ def play_at_once(agent, arrays, problem, rng=None):
     """Like :func:`app.learning.universal.episodes.rollout.play`; a step's UAVs decide on the same state."""
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
-    episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
-    look(arrays, episodes, outlook)
+    episodes, gains = new_episodes(arrays, batch, problem), new_gains(arrays, batch)
+    look(arrays, episodes, gains)
     plans, rewards = np.full((batch, steps, m), n, np.int64), np.zeros(batch)
-    scaled = torch.from_numpy((arrays.between / outlook.extent[:, None, None]).astype(np.float32))
+    scaled = torch.from_numpy((arrays.between / gains.extent[:, None, None]).astype(np.float32))
     bias, hidden = agent.bias(scaled), torch.zeros(m, batch, agent.home.shape[0])
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
@@ -54,7 +54,7 @@ def play_at_once(agent, arrays, problem, rng=None):
     for s in range(steps):
         preferences = np.zeros((m, batch, n + 1))
         for i in range(m):
-            count = _observe(arrays, episodes, outlook, i, pair, own, rivals, turn)
+            count = _observe(arrays, episodes, gains, i, pair, own, rivals, turn)
             if not count:
                 continue
             who = torch.from_numpy(turn[:count])
@@ -68,15 +68,15 @@ def play_at_once(agent, arrays, problem, rng=None):
             logits = agent.logits(agent.values(tokens, hidden[i, who])).numpy()
             noise = 0.0 if rng is None else rng.gumbel(size=logits.shape)
             preferences[i, turn[:count]] = logits + noise
-        _take(arrays, episodes, outlook, preferences, plans[:, s], rewards)
+        _take(arrays, episodes, gains, preferences, plans[:, s], rewards)
         if episodes.done.all():
             break
     return Played(plans, rewards)
 
 
 @njit(error_model="numpy")
-def _unfold(arrays, episodes, outlook, plans, turns):
-    look(arrays, episodes, outlook)
+def _unfold(arrays, episodes, gains, plans, turns):
+    look(arrays, episodes, gains)
     count = 0
     for b in range(plans.shape[0]):
         for s in range(plans.shape[1]):
@@ -86,7 +86,14 @@ def _unfold(arrays, episodes, outlook, plans, turns):
                 if episodes.ret[b, i]:
                     continue
                 observe(
-                    arrays, episodes, outlook, b, i, turns.pair[count], turns.own[count], turns.rivals[count]
+                    arrays,
+                    episodes,
+                    gains,
+                    b,
+                    i,
+                    turns.pair[count],
+                    turns.own[count],
+                    turns.rivals[count],
                 )
                 turns.action[count] = plans[b, s, i]
                 turns.episode[count], turns.step[count], turns.uav[count] = b, s, i
@@ -94,26 +101,26 @@ def _unfold(arrays, episodes, outlook, plans, turns):
             for i in range(plans.shape[2]):
                 if not episodes.ret[b, i]:
                     turns.reward[b, s] += act(arrays, episodes, b, i, plans[b, s, i])
-                    look_again(arrays, episodes, outlook, b, i, plans[b, s, i])
+                    look_again(arrays, episodes, gains, b, i, plans[b, s, i])
             turns.reward[b, s] += end_step(arrays, episodes, b)
     return count
 
 
 @njit(error_model="numpy")
-def _observe(arrays, episodes, outlook, i, pair, own, rivals, turn):
+def _observe(arrays, episodes, gains, i, pair, own, rivals, turn):
     count = 0
     for b in range(episodes.done.shape[0]):
-        if episodes.done[b] or episodes.ret[b, i] or outlook.net[b, i].max() <= FORBIDDEN:
+        if episodes.done[b] or episodes.ret[b, i] or gains.net[b, i].max() <= FORBIDDEN:
             continue
-        observe(arrays, episodes, outlook, b, i, pair[count], own[count], rivals[count])
+        observe(arrays, episodes, gains, b, i, pair[count], own[count], rivals[count])
         turn[count] = b
         count += 1
     return count
 
 
 @njit(error_model="numpy")
-def _take(arrays, episodes, outlook, preferences, joint, rewards):
-    n = outlook.net.shape[2]
+def _take(arrays, episodes, gains, preferences, joint, rewards):
+    n = gains.net.shape[2]
     for b in range(episodes.done.shape[0]):
         if episodes.done[b]:
             continue
@@ -122,10 +129,10 @@ def _take(arrays, episodes, outlook, preferences, joint, rewards):
                 continue
             action = n
             for j in range(n):
-                allowed = outlook.net[b, i, j] > FORBIDDEN
+                allowed = gains.net[b, i, j] > FORBIDDEN
                 if allowed and preferences[i, b, j] > preferences[i, b, action]:
                     action = j
             joint[b, i] = action
             rewards[b] += act(arrays, episodes, b, i, action)
-            look_again(arrays, episodes, outlook, b, i, action)
+            look_again(arrays, episodes, gains, b, i, action)
         rewards[b] += end_step(arrays, episodes, b)

@@ -6,17 +6,17 @@ from datetime import UTC, datetime
 
 import pytest
 
-from app.jobs.company import Alone
 from app.jobs.lanes import Lanes
-from app.jobs.last_minute import LastMinute
 from app.jobs.model import Job, JobKind, JobStatus, Progress
+from app.jobs.overdue import OverdueJobs
+from app.jobs.peers import NoPeers
 from app.jobs.waiting import Waiting
 
 HASTY = JobKind("hasty", "job_work:echo", "interactive", at_once="job_work:echo")
 PATIENT = JobKind("patient", "job_work:echo", "interactive")
 
 
-class Others(Alone):
+class Others(NoPeers):
     """Other services that may have taken in jobs, of which nobody has told."""
 
     others_may_wait = True
@@ -77,12 +77,12 @@ def test_what_others_have_answered_is_not_answered_here(lanes, job):
     async def answer(job_ids):
         answered.extend(job_ids)
         if "last" in job_ids:
-            last_minute.end()
+            overdue.end()
         return dict.fromkeys(job_ids, 0.0)
 
     async def scenario():
         kinds = {kind.name: kind for kind in (HASTY, PATIENT)}
-        waiting = Waiting(lanes, kinds, last_minute, Others("me"), asyncio.Event())
+        waiting = Waiting(lanes, kinds, overdue, Others("me"), asyncio.Event())
         for job_id in ("ended here", "of before"):
             waiting.more(replace(job, id=job_id, kind="hasty"), 0.0)
         waiting.watch_anew(
@@ -90,8 +90,8 @@ def test_what_others_have_answered_is_not_answered_here(lanes, job):
             + [(job_id, "hasty", at) for at, job_id in enumerate(["ended elsewhere", "first", "last"])]
         )
         waiting.forget("ended elsewhere")
-        await last_minute.keep()
+        await overdue.keep()
 
-    last_minute = LastMinute(answer)
+    overdue = OverdueJobs(answer)
     asyncio.run(scenario())
     assert answered == ["first", "last"]

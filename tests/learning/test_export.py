@@ -18,7 +18,7 @@ from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import Actor
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
-from app.learning.universal.episodes.observation import look, look_again, new_outlook, observe, scales
+from app.learning.universal.episodes.observation import look, look_again, new_gains, observe, scales
 from app.learning.universal.episodes.rollout import play
 from app.learning.universal.network.architecture import (
     OWN_FEATURES,
@@ -73,8 +73,8 @@ def fly(session, policy, problem):
     """
     arrays = compile_problem(problem)
     m, n, _ = arrays.shape
-    episodes, outlook = new_episodes(arrays, 1), new_outlook(arrays, 1)
-    look(arrays, episodes, outlook)
+    episodes, gains = new_episodes(arrays, 1), new_gains(arrays, 1)
+    look(arrays, episodes, gains)
     hidden = [np.zeros((1, policy.config.width), np.float32)] * m
     distances = (arrays.between[0] / scales(arrays)[0][0]).astype(np.float32)
     plan = np.full((problem.max_steps, m), n)
@@ -86,7 +86,7 @@ def fly(session, policy, problem):
                 continue
             pair, own = np.empty((n, PAIR_FEATURES), np.float32), np.empty(OWN_FEATURES, np.float32)
             rivals = np.empty((n, m, RIVAL_FEATURES), np.float32)
-            observe(arrays, episodes, outlook, 0, i, pair, own, rivals)
+            observe(arrays, episodes, gains, 0, i, pair, own, rivals)
             fed = dict(
                 zip(
                     UniversalOnBoard.INPUTS,
@@ -99,7 +99,7 @@ def fly(session, policy, problem):
             hidden[i], action = given["new_hidden"], int(given["action"][0])
             plan[step, i] = action
             act(arrays, episodes, 0, i, action)
-            look_again(arrays, episodes, outlook, 0, i, action)
+            look_again(arrays, episodes, gains, 0, i, action)
         end_step(arrays, episodes, 0)
     return plan
 

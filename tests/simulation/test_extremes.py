@@ -10,7 +10,7 @@ from referee import replay
 
 from app.domain.problem import MAX_MAGNITUDE, MIN_MAGNITUDE, UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.learning.universal.episodes.observation import look, new_outlook, observe
+from app.learning.universal.episodes.observation import look, new_gains, observe
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.library.description import task_description
 from app.library.summary import task_summary
@@ -78,10 +78,10 @@ def observed(problem, moves=()):
     """All that the first UAV that has not returned sees at its turn, after some moves of the greedy plan."""
     arrays = compile_problem(problem)
     m, n, _ = arrays.shape
-    episodes, outlook = new_episodes(arrays, 1), new_outlook(arrays, 1)
+    episodes, gains = new_episodes(arrays, 1), new_gains(arrays, 1)
     for i, action in enumerate(moves):
         act(arrays, episodes, 0, i, action)
-    look(arrays, episodes, outlook)
+    look(arrays, episodes, gains)
     seen = (
         np.empty((n, PAIR_FEATURES), np.float32),
         np.empty(OWN_FEATURES, np.float32),
@@ -90,7 +90,7 @@ def observed(problem, moves=()):
     out = np.flatnonzero(~episodes.ret[0])
     if not len(out):
         return np.zeros(1)
-    observe(arrays, episodes, outlook, 0, int(out[-1]), *seen)
+    observe(arrays, episodes, gains, 0, int(out[-1]), *seen)
     return np.concatenate([each.ravel() for each in seen])
 
 

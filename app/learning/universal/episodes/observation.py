@@ -39,7 +39,7 @@ FORBIDDEN = -np.inf
 """Value of a visit that is not allowed."""
 
 
-class Outlook(NamedTuple):
+class VisitGains(NamedTuple):
     """What each episode's UAVs could earn at each target now; kept up to date turn by turn.
 
     Attributes
@@ -77,8 +77,8 @@ def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
     return extent, np.where(level > 0, level, 1.0), extent / np.where(speed > 0, speed, 1.0)
 
 
-def new_outlook(arrays: ProblemArrays, batch: int) -> Outlook:
-    """Make the outlook of `batch` episodes; :func:`look` fills it.
+def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
+    """Make the gains of `batch` episodes; :func:`look` fills it.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def new_outlook(arrays: ProblemArrays, batch: int) -> Outlook:
     between = np.where(arrays.need_total[:, None, :] > 0, arrays.between, np.inf)
     between[:, np.arange(n), np.arange(n)] = np.inf
     near = np.argsort(between, axis=2, kind="stable")[:, :, :length]
-    return Outlook(
+    return VisitGains(
         extent=extent,
         level=level,
         time=time,
@@ -106,38 +106,38 @@ def new_outlook(arrays: ProblemArrays, batch: int) -> Outlook:
 
 
 @compiled
-def look(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook) -> None:
-    """Work out everything of the outlook for the present state of every episode."""
+def look(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains) -> None:
+    """Work out everything of the gains for the present state of every episode."""
     for b in range(episodes.at.shape[0]):
         for i in range(episodes.at.shape[1]):
             for j in range(episodes.need.shape[1]):
-                _value(arrays, episodes, outlook, b, i, j)
+                _value(arrays, episodes, gains, b, i, j)
 
 
 @compiled
 def look_again(
-    arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, action: int
+    arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int, i: int, action: int
 ) -> None:
-    """Bring the outlook up to date after UAV `i` of episode `b` took an action."""
+    """Bring the gains up to date after UAV `i` of episode `b` took an action."""
     for j in range(episodes.need.shape[1]):
-        _value(arrays, episodes, outlook, b, i, j)
+        _value(arrays, episodes, gains, b, i, j)
     if action < episodes.need.shape[1]:
         for other in range(episodes.at.shape[1]):
-            _value(arrays, episodes, outlook, b, other, action)
+            _value(arrays, episodes, gains, b, other, action)
 
 
 @compiled
-def _value(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, j: int) -> None:
+def _value(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int, i: int, j: int) -> None:
     p = episodes.problem[b]
     if verdict(arrays, episodes, b, i, j) != ALLOWED:
-        outlook.net[b, i, j], outlook.unloaded[b, i, j] = FORBIDDEN, 0.0
+        gains.net[b, i, j], gains.unloaded[b, i, j] = FORBIDDEN, 0.0
         return
     unloaded = 0.0
     for k in range(episodes.load.shape[2]):
         unloaded += min(episodes.load[b, i, k], episodes.need[b, j, k])
     cost = arrays.weight[p] * leg_to(arrays, episodes, b, i, j)
-    outlook.net[b, i, j] = arrays.level[p, j] * unloaded / arrays.need_total[p, j] - cost
-    outlook.unloaded[b, i, j] = unloaded
+    gains.net[b, i, j] = arrays.level[p, j] * unloaded / arrays.need_total[p, j] - cost
+    gains.unloaded[b, i, j] = unloaded
 
 
 @compiled
@@ -156,7 +156,7 @@ def clip(x: float, low: float, high: float) -> float:
 def observe(
     arrays: ProblemArrays,
     episodes: Episodes,
-    outlook: Outlook,
+    gains: VisitGains,
     b: int,
     i: int,
     pair: Float32s,
@@ -167,8 +167,8 @@ def observe(
 
     Parameters
     ----------
-    arrays, episodes, outlook
-        The outlook is up to date.
+    arrays, episodes, gains
+        The gains is up to date.
     b, i
         Episode and UAV; it has not returned.
     pair
@@ -181,17 +181,17 @@ def observe(
     """
     p = episodes.problem[b]
     m, n = episodes.at.shape[1], episodes.need.shape[1]
-    scale, extent, time = outlook.level[p], outlook.extent[p], outlook.time[p]
+    scale, extent, time = gains.level[p], gains.extent[p], gains.time[p]
     steps_left = arrays.max_steps[p] - episodes.step[b]
     load = 0.0
     for k in range(episodes.load.shape[2]):
         load += episodes.load[b, i, k]
-    _best_two_of_each(episodes, outlook, b)
+    _best_two_of_each(episodes, gains, b)
     home_now = leg_home(arrays, episodes, b, i)
 
     allowed_visits, others_best = 0, 0.0
     for j in range(n):
-        net = outlook.net[b, i, j]
+        net = gains.net[b, i, j]
         allowed = net > FORBIDDEN
         allowed_visits += allowed
         d = leg_to(arrays, episodes, b, i, j)
@@ -199,7 +199,7 @@ def observe(
         need = 0.0
         for k in range(episodes.need.shape[2]):
             need += episodes.need[b, j, k]
-        unloaded = outlook.unloaded[b, i, j]
+        unloaded = gains.unloaded[b, i, j]
         value = arrays.level[p, j] * unloaded / max(arrays.need_total[p, j], 1e-300)
         cost = arrays.weight[p] * d
         reach = episodes.flown[b, i] + d + (home_then if arrays.return_to_base[p] else 0.0)
@@ -208,34 +208,32 @@ def observe(
 
         best, second, rival, able, supply = FORBIDDEN, FORBIDDEN, -1, 0, 0.0
         for other in range(m):
-            other_net = outlook.net[b, other, j]
+            other_net = gains.net[b, other, j]
             seen = rivals[j, other]
             if other == i or other_net <= FORBIDDEN or (other < i and steps_left <= 1):
                 for f in range(RIVAL_FEATURES):
                     seen[f] = 0.0
                 continue
             able += 1
-            its_elsewhere = (
-                outlook.second[other] if outlook.first[other] <= other_net else outlook.first[other]
-            )
+            its_elsewhere = gains.second[other] if gains.first[other] <= other_net else gains.first[other]
             seen[0] = 1.0
             seen[1] = squash(other_net / scale)
             seen[2] = squash((other_net - max(its_elsewhere, 0.0)) / scale)
-            seen[3] = outlook.unloaded[b, other, j] / need
+            seen[3] = gains.unloaded[b, other, j] / need
             seen[4] = 1.0 if other > i else 0.0
             seen[5] = leg_to(arrays, episodes, b, other, j) / extent
-            supply += outlook.unloaded[b, other, j]
+            supply += gains.unloaded[b, other, j]
             if other_net > best:
                 best, second, rival = other_net, best, other
             elif other_net > second:
                 second = other_net
         regret = 0.0
         if rival >= 0:
-            elsewhere = outlook.second[rival] if outlook.first[rival] <= best else outlook.first[rival]
+            elsewhere = gains.second[rival] if gains.first[rival] <= best else gains.first[rival]
             regret = best - max(elsewhere, 0.0)
             others_best = max(others_best, best)
-        mine_elsewhere = outlook.second[i] if outlook.first[i] <= net else outlook.first[i]
-        follow_up = _follow_up(arrays, episodes, outlook, b, i, j) if allowed and steps_left > 1 else 0.0
+        mine_elsewhere = gains.second[i] if gains.first[i] <= net else gains.first[i]
+        follow_up = _follow_up(arrays, episodes, gains, b, i, j) if allowed and steps_left > 1 else 0.0
 
         row = pair[j]
         row[0] = 1.0 if allowed else 0.0
@@ -271,20 +269,20 @@ def observe(
         row[28] = 1.0 if load > 0.0 and unloaded >= load * (1.0 - 1e-9) else 0.0
         row[29] = min(supply / max(need - unloaded, 1e-300), 1.0) if need - unloaded > 0.0 else 1.0
 
-    _observe_self(arrays, episodes, outlook, b, i, own)
+    _observe_self(arrays, episodes, gains, b, i, own)
     own[0] = allowed_visits / n
-    own[1] = squash(outlook.first[i] / scale) if allowed_visits > 0 else -1.0
+    own[1] = squash(gains.first[i] / scale) if allowed_visits > 0 else -1.0
     own[2] = squash(others_best / scale)
 
 
 @compiled
 def _observe_self(
-    arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, own: Float32s
+    arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int, i: int, own: Float32s
 ) -> None:
     """Write what does not belong to one target; entries 0 to 2 are the caller's."""
     p = episodes.problem[b]
     m, n, materials = episodes.at.shape[1], episodes.need.shape[1], episodes.load.shape[2]
-    scale, extent, time = outlook.level[p], outlook.extent[p], outlook.time[p]
+    scale, extent, time = gains.level[p], gains.extent[p], gains.time[p]
     steps = arrays.max_steps[p]
     steps_left = steps - episodes.step[b]
     load = start_load = most = swarm = 0.0
@@ -334,29 +332,29 @@ def _observe_self(
 
 
 @compiled
-def _best_two_of_each(episodes: Episodes, outlook: Outlook, b: int) -> None:
+def _best_two_of_each(episodes: Episodes, gains: VisitGains, b: int) -> None:
     """Fill the scratch space with the best and second best visit of every UAV."""
     for other in range(episodes.at.shape[1]):
         first, second = FORBIDDEN, FORBIDDEN
         for j in range(episodes.need.shape[1]):
-            net = outlook.net[b, other, j]
+            net = gains.net[b, other, j]
             if net > first:
                 first, second = net, first
             elif net > second:
                 second = net
-        outlook.first[other], outlook.second[other] = first, second
+        gains.first[other], gains.second[other] = first, second
 
 
 @compiled
-def _follow_up(arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, b: int, i: int, j: int) -> float:
+def _follow_up(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int, i: int, j: int) -> float:
     """Reward of the best visit after one to target `j`, 0 or more, by what is needed now."""
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
     flown = episodes.flown[b, i] + d
     clock = episodes.clock[b, i] + d / arrays.speed[p, i] + arrays.service[p, j]
     best = 0.0
-    for q in range(outlook.near.shape[2]):
-        then = outlook.near[p, j, q]
+    for q in range(gains.near.shape[2]):
+        then = gains.near[p, j, q]
         leg = arrays.between[p, j, then]
         reach = flown + leg + (arrays.home[p, i, then] if arrays.return_to_base[p] else 0.0)
         arrival = clock + leg / arrays.speed[p, i]

@@ -11,10 +11,10 @@ from app.learning.compute.kernels import Float32s
 from app.learning.parameters import SERVICE_EPSILON
 from app.learning.universal.episodes.observation import (
     FORBIDDEN,
-    Outlook,
+    VisitGains,
     look,
     look_again,
-    new_outlook,
+    new_gains,
     observe,
 )
 from app.learning.universal.episodes.turn_order import reorder, restore_plans
@@ -83,12 +83,12 @@ def play(
     """
     m, n, _ = arrays.shape
     batch, steps = len(problem), int(arrays.max_steps.max())
-    episodes, outlook = new_episodes(arrays, batch, problem), new_outlook(arrays, batch)
-    look(arrays, episodes, outlook)
+    episodes, gains = new_episodes(arrays, batch, problem), new_gains(arrays, batch)
+    look(arrays, episodes, gains)
     plans = np.full((batch, steps, m), n, np.int64)
     rewards = np.zeros(batch)
     compiled, sharpness = compile_agent(agent), float(agent.sharpness.detach().exp())
-    bias = attention_bias(agent, (arrays.between / outlook.extent[:, None, None]).astype(np.float32))
+    bias = attention_bias(agent, (arrays.between / gains.extent[:, None, None]).astype(np.float32))
     hidden = np.zeros((m, batch, len(compiled.home)), np.float32)
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
@@ -100,7 +100,7 @@ def play(
             if stop():
                 _send_home(arrays, episodes, rewards)
                 return Played(plans, rewards)
-            count = _observe_turn(arrays, episodes, outlook, i, pair, own, rivals, turn, rewards)
+            count = _observe_turn(arrays, episodes, gains, i, pair, own, rivals, turn, rewards)
             if not count:
                 continue
             who = turn[:count]
@@ -135,7 +135,7 @@ def play(
                 _, which = np.unique(place * (n + 1) + actions, return_inverse=True)
                 branch[who] = branches + which
                 branches += count
-            _act_turn(arrays, episodes, outlook, i, who, actions, plans[:, s], rewards)
+            _act_turn(arrays, episodes, gains, i, who, actions, plans[:, s], rewards)
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
             break
@@ -181,7 +181,7 @@ def play_in_orders(
 def _observe_turn(
     arrays: ProblemArrays,
     episodes: Episodes,
-    outlook: Outlook,
+    gains: VisitGains,
     i: int,
     pair: Float32s,
     own: Float32s,
@@ -197,10 +197,10 @@ def _observe_turn(
     for b in range(episodes.done.shape[0]):
         if episodes.done[b] or episodes.ret[b, i]:
             continue
-        if outlook.net[b, i].max() <= FORBIDDEN:
-            rewards[b] += act(arrays, episodes, b, i, outlook.net.shape[2])
+        if gains.net[b, i].max() <= FORBIDDEN:
+            rewards[b] += act(arrays, episodes, b, i, gains.net.shape[2])
         else:
-            observe(arrays, episodes, outlook, b, i, pair[count], own[count], rivals[count])
+            observe(arrays, episodes, gains, b, i, pair[count], own[count], rivals[count])
             turn[count] = b
             count += 1
     return count
@@ -210,7 +210,7 @@ def _observe_turn(
 def _act_turn(
     arrays: ProblemArrays,
     episodes: Episodes,
-    outlook: Outlook,
+    gains: VisitGains,
     i: int,
     turn: Integers,
     actions: Integers,
@@ -221,7 +221,7 @@ def _act_turn(
         b, action = turn[q], actions[q]
         joint[b, i] = action
         rewards[b] += act(arrays, episodes, b, i, action)
-        look_again(arrays, episodes, outlook, b, i, action)
+        look_again(arrays, episodes, gains, b, i, action)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

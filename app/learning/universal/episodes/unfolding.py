@@ -8,10 +8,10 @@ import numpy as np
 
 from app.learning.compute.kernels import Float32s
 from app.learning.universal.episodes.observation import (
-    Outlook,
+    VisitGains,
     look,
     look_again,
-    new_outlook,
+    new_gains,
     observe,
 )
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -56,7 +56,7 @@ def unfold(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
         (B,) and (B, S, M): the plans and whose they are.
     """
     episodes = new_episodes(arrays, len(plans), problem)
-    outlook = new_outlook(arrays, len(plans))
+    gains = new_gains(arrays, len(plans))
     n = arrays.shape[1]
     most = plans.size
     turns = Turns(
@@ -69,7 +69,7 @@ def unfold(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
         uav=np.empty(most, np.int64),
         reward=np.zeros(plans.shape[:2]),
     )
-    count = _unfold(arrays, episodes, outlook, plans, turns)
+    count = _unfold(arrays, episodes, gains, plans, turns)
     columns = {name: column[:count] for name, column in turns._asdict().items() if name != "reward"}
     return Turns(**columns, reward=turns.reward)
 
@@ -83,9 +83,9 @@ def of_uavs(turns: Turns, uavs: Integers) -> Turns:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _unfold(
-    arrays: ProblemArrays, episodes: Episodes, outlook: Outlook, plans: Integers, turns: Turns
+    arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, plans: Integers, turns: Turns
 ) -> int:
-    look(arrays, episodes, outlook)
+    look(arrays, episodes, gains)
     count = 0
     for b in range(plans.shape[0]):
         for s in range(plans.shape[1]):
@@ -95,12 +95,19 @@ def _unfold(
                 if episodes.ret[b, i]:
                     continue
                 observe(
-                    arrays, episodes, outlook, b, i, turns.pair[count], turns.own[count], turns.rivals[count]
+                    arrays,
+                    episodes,
+                    gains,
+                    b,
+                    i,
+                    turns.pair[count],
+                    turns.own[count],
+                    turns.rivals[count],
                 )
                 turns.action[count] = plans[b, s, i]
                 turns.episode[count], turns.step[count], turns.uav[count] = b, s, i
                 turns.reward[b, s] += act(arrays, episodes, b, i, plans[b, s, i])
-                look_again(arrays, episodes, outlook, b, i, plans[b, s, i])
+                look_again(arrays, episodes, gains, b, i, plans[b, s, i])
                 count += 1
             turns.reward[b, s] += end_step(arrays, episodes, b)
     return count

@@ -31,7 +31,7 @@ from app.learning.compute.kernels import (
 )
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import HEADS
-from app.learning.universal.network.parallel import helpers, lanes
+from app.learning.universal.network.parallel import helpers, parallel_threads
 from app.simulation.arrays import Integers
 from app.simulation.compilation import njit
 
@@ -138,7 +138,7 @@ def ask_together(
 ) -> None:
     """Do what :func:`ask` does with up to so many threads more; the values are the same with any number."""
     turns, tokens = values.shape
-    parts = min(lanes(spare), turns * tokens // _TOKENS_A_THREAD)
+    parts = min(parallel_threads(spare), turns * tokens // _TOKENS_A_THREAD)
     if parts <= 1:
         ask(agent, pair, own, rivals, bias, problem, hidden, values)
         return

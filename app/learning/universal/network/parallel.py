@@ -17,27 +17,27 @@ _HELPERS = max(1, (os.cpu_count() or 1) - 1)
 @cache
 def helpers() -> ThreadPoolExecutor:
     """The threads beside the calling one; started when they are first needed."""
-    return ThreadPoolExecutor(_HELPERS, "lane")
+    return ThreadPoolExecutor(_HELPERS, "parallel")
 
 
-def lanes(spare: int) -> int:
+def parallel_threads(spare: int) -> int:
     """How many threads work together where so many cores are idle, the calling one included."""
     return 1 + max(0, min(spare, _HELPERS))
 
 
-def in_lanes(work: Callable[[Item], Result], items: Sequence[Item], spare: int) -> Iterator[Result]:
+def in_parallel(work: Callable[[Item], Result], items: Sequence[Item], spare: int) -> Iterator[Result]:
     """Work on items side by side; return the results in the items' order, each as soon as it is there.
 
     Parameters
     ----------
     work
-        What is done with each. It must not wait for other work that is done in lanes.
+        What is done with each. It must not wait for other work that is done in parallel.
     items
         With none of them left out, unless whoever iterates stops: then those that have not begun.
     spare
         Cores that are idle.
     """
-    count = min(lanes(spare), len(items))
+    count = min(parallel_threads(spare), len(items))
     if count <= 1:
         yield from map(work, items)
         return

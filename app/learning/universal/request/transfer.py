@@ -22,7 +22,7 @@ from app.learning.universal.episodes.effort import Effort, batch_of, effort
 from app.learning.universal.episodes.rollout import play, play_in_orders
 from app.learning.universal.episodes.temperature import Temperature
 from app.learning.universal.episodes.turn_order import some_orders
-from app.learning.universal.network.parallel import in_lanes
+from app.learning.universal.network.parallel import in_parallel
 from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import FineTuning, require_memory
 from app.learning.universal.request.polishing import polish
@@ -149,7 +149,7 @@ class UniversalTransfer:
         # Where policies are played side by side, there is no core left for the turns of one of them.
         spare = self._spare()
         within = self._spare if len(tried) == 1 else none_spare
-        for source, plans in zip(tried, in_lanes(play_from, tried, spare), strict=False):
+        for source, plans in zip(tried, in_parallel(play_from, tried, spare), strict=False):
             found.append((source, self._best.consider(plans)))
             if not self._used.is_bare:
                 self._recombination.consider(plans, self._stop)

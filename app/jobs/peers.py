@@ -1,6 +1,6 @@
 """Whether other services work on the same job table, and what a dispatcher then has to do with them.
 
-On SQLite a service is :class:`Alone`; on a shared database it is in the company of others, see
+On SQLite a service has :class:`NoPeers`; on a shared database it has those of
 :class:`app.jobs.shared.Shared`.
 """
 
@@ -39,7 +39,7 @@ class Reactions:
     look_after: Callable[[], Awaitable[None]]
 
 
-class Company(Protocol):
+class Peers(Protocol):
     """The other services, as the dispatcher deals with them; called on the event loop where not said."""
 
     others_may_wait: bool
@@ -64,7 +64,7 @@ class Company(Protocol):
         """Tell that a job, which runs elsewhere, should stop."""
 
 
-class Alone:
+class NoPeers:
     """There are no others: the database belongs to this service as long as it runs.
 
     Parameters

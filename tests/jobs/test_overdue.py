@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from harness import KINDS, eventually, finished, running
 
-from app.jobs.last_minute import Pace, Wait, due, latest_start
 from app.jobs.local import LocalExecutor
 from app.jobs.model import BEST_KNOWN, JobKind, JobStatus
+from app.jobs.overdue import Pace, Wait, due, latest_start
 
 HASTY = (
     *KINDS,
@@ -86,7 +86,7 @@ def test_a_waiting_job_is_answered_when_its_time_is_up(tmp_path):
                 done = await finished(service, job)
                 assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
                 assert done.result["echo"] == job.payload
-            # The worker was busy all the while, and who has nothing for the last minute waits for it.
+            # The worker was busy all the while, and a kind with nothing to answer at once waits for it.
             assert (await service.get(holder.id)).status is JobStatus.RUNNING
             assert (await service.get(patient.id)).status is JobStatus.QUEUED
             assert service.load().waiting["interactive"] == 1
