@@ -136,7 +136,7 @@ class _Patient(h11.Connection):
 
 
 class _KeptOpen:
-    """A transport whose end is left to the protocol: closed at once, a client that still sends loses its answer."""
+    """A transport that the protocol closes later: at once, a client that still sends loses its answer."""
 
     def __init__(self, transport: asyncio.Transport) -> None:
         self._transport = transport

@@ -69,7 +69,7 @@ def unmet_targets(
     lookout = Lookout(arrays, plan, *scratch, hurry)
     counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
     judge = _Judge(problem, arrays, plan, needs, start, lookout, counterfactuals)
-    # All of them first have a reason without looking, so that a look can end anywhere and nothing is left to do.
+    # All of them first have a reason without looking, so that a look can end anywhere.
     found = {j: judge.at_once(j) for j in open_targets.tolist()}
     for looked, j in enumerate(urgent.tolist()):
         places = lookout.look(j, start)
