@@ -61,10 +61,11 @@ class AnswerSize(NamedTuple):
 def expected_size(problem: Problem) -> AnswerSize:
     """Return what the answer to a problem may be like before a plan of it is known.
 
-    Every visit that unloads greedily uses up a load or meets a need.
+    Every visit that unloads greedily uses up a load or meets a need, and areas that nobody visits are unmet.
     """
     m, n = problem.n_uavs, problem.n_targets
-    return AnswerSize(min(m * problem.max_steps, m + 2 * n), int(_LIKELY_UNMET * n) + 1)
+    visits = min(m * problem.max_steps, m + 2 * n)
+    return AnswerSize(visits, max(int(_LIKELY_UNMET * n) + 1, n - visits))
 
 
 class AnswerTime:

@@ -16,7 +16,6 @@ from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
 import app
-from app.api import stored_json
 from app.api.access.guard import Guard
 from app.api.access.hosts import Hosts
 from app.api.access.keys import KeyStore
@@ -35,6 +34,7 @@ from app.api.routes import algorithms, allocation, batch, examples, jobs, librar
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.api.threads import started_threads
+from app.jobs import stored_json
 from app.jobs.executor import Executor
 from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED, LocalExecutor
 from app.jobs.ray_cluster import RayExecutor

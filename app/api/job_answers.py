@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import Request
@@ -11,12 +12,12 @@ from starlette.responses import Response
 
 from app.api.access.guard import client
 from app.api.errors import JobCancelled, JobFailed
-from app.api.job_models import job_response, result_of
+from app.api.job_models import job_response, result_of, written_result_of
 from app.api.preferences import Preferences
 from app.api.problem_models import WireModel
-from app.api.stored_json import write
 from app.jobs.errors import Draining
 from app.jobs.model import Idempotency, Job, JobStatus
+from app.jobs.stored_json import StoredJson, write
 
 
 def idempotency(key: str | None, kind: str, body: WireModel) -> Idempotency | None:
@@ -64,11 +65,33 @@ def answer_of(job: Job, blamed: str | None = None) -> dict[str, Any]:
     Draining
         If it has not ended, because the service stops; it goes on with the next start.
     """
+    _require_result(job, blamed)
+    result = result_of(job)
+    assert result is not None
+    return result
+
+
+def written_answer_of(job: Job, fields: Mapping[str, Any]) -> str:
+    """Return the same as JSON, with the defaults of fields that an earlier version did not answer.
+
+    Raises
+    ------
+    JobFailed, JobCancelled, Draining
+        As :func:`answer_of` does.
+    """
+    _require_result(job, None)
+    if isinstance(job.result, StoredJson) and job.result.is_new:
+        text = written_result_of(job)
+        assert text is not None
+        return text
+    answer = answer_of(job)
+    return write({name: answer.get(name, default) for name, default in fields.items()})
+
+
+def _require_result(job: Job, blamed: str | None) -> None:
     if not job.status.finished:
         raise Draining
     if job.status is JobStatus.FAILED and job.error is not None:
         raise JobFailed(job.id, job.error, blamed)
-    result = result_of(job)
-    if result is None:
+    if job.result is None:
         raise JobCancelled(job.id)
-    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import Connection
@@ -21,7 +22,7 @@ REGISTER = "register"
 _REASONS = FollowUp("app.allocation.tasks:complete_reasons", {"reasons": "incomplete"})
 
 
-def _effort(payload: dict[str, Any]) -> float:
+def _effort(payload: Mapping[str, Any]) -> float:
     """Return how much larger than a small one an allocation is, to read, to plan greedily and to write."""
     problem = payload["problem"]
     m, n, k = len(problem["uavs"]), len(problem["targets"]), len(problem["uavs"][0]["loadlist"])
@@ -43,7 +44,7 @@ def job_kinds(
         How long an allocation and a training may run, in seconds; None: as long as they like.
     """
 
-    def add_to_library(connection: Connection, job: Job, work: WorkResult) -> dict[str, Any]:
+    def add_to_library(connection: Connection, job: Job, work: WorkResult) -> Mapping[str, Any]:
         if work.artifact is None:
             raise InvalidCheckpoint(
                 f"{job.kind} job {job.id} has left no checkpoint: it was stopped before its first epoch, or "

@@ -14,6 +14,7 @@ from app.api.problem_details import FieldError
 from app.api.problem_models import ProblemModel
 from app.jobs import model
 from app.jobs.model import Job, JobPage, JobStatus
+from app.jobs.stored_json import write
 
 
 class ProgressSummary(AnswerModel):
@@ -104,6 +105,14 @@ def problem_of(job: Job) -> ProblemModel:
         for uav in record["uavs"]
     ]
     return ProblemModel.model_validate({**record, "uavs": uavs})
+
+
+def written_result_of(job: Job) -> str | None:
+    """Return the same as JSON, as it was written."""
+    elapsed_s = _elapsed_s(job)
+    if job.result is None or elapsed_s is None:
+        return None
+    return _joined(json.dumps({"job_id": job.id}), write(job.result), json.dumps({"elapsed_s": elapsed_s}))
 
 
 def result_of(job: Job) -> dict[str, Any] | None:

@@ -9,12 +9,14 @@ import time
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from email.message import Message as Header
 from typing import Annotated, Any, cast
 
 from fastapi import Request
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Discriminator
+from pydantic_core import from_json
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
@@ -37,6 +39,8 @@ Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 _READ_AT_ONCE_BYTES = 16_384
 """A body up to this is read in a millisecond, less than it takes to hand it over."""
+
+_NESTING = frozenset({dict, list})
 
 _SHOWN = 20
 """Characters of a body that are shown before and after the place where it is not JSON."""
@@ -126,8 +130,15 @@ def parse_json(body: bytes) -> Any:
     InvalidBody
         If an object has more names than any of a request.
     """
+    body = body.removeprefix(codecs.BOM_UTF8)
+    with suppress(ValueError):
+        value = from_json(body)
+        # Every name has a colon: as many names as colons, and none is there twice. In doubt, as where a text
+        # has a colon, or something is wrong, the slower parser looks at every object and says what it is.
+        if body.count(b":") == _names_in(value):
+            return value
     try:
-        text = body.removeprefix(codecs.BOM_UTF8).decode("utf-8")
+        text = body.decode("utf-8")
         return json.loads(text, object_pairs_hook=_unique_names)
     except UnicodeDecodeError as error:
         raise MalformedJson(f"byte {error.start} is not UTF-8") from None
@@ -140,6 +151,17 @@ def parse_json(body: bytes) -> Any:
         raise MalformedJson("it is nested too deep") from None
     except ValueError:
         raise MalformedJson("an integer has too many digits") from None
+
+
+def _names_in(value: Any) -> int:
+    """Count the names of all objects; fewer where objects stand in a list behind something else."""
+    if isinstance(value, dict):
+        if len(value) > MOST_NAMES:
+            return -1
+        return len(value) + sum(_names_in(each) for each in value.values() if type(each) in _NESTING)
+    if isinstance(value, list) and value and type(value[0]) in _NESTING:
+        return sum(map(_names_in, value))
+    return 0
 
 
 def _unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

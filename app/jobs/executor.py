@@ -71,7 +71,7 @@ class Executor(Protocol):
     def submit(
         self,
         work: str,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         *,
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],

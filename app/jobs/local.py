@@ -82,7 +82,7 @@ class LocalExecutor(SlotExecutor["_Worker"]):
     def submit(
         self,
         work: str,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         *,
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],

@@ -140,8 +140,8 @@ class Job(JobSummary):
         What the work function returned; a cancelled job has one if its work stopped by itself.
     """
 
-    payload: dict[str, Any]
-    result: dict[str, Any] | None
+    payload: Mapping[str, Any]
+    result: Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,19 +225,19 @@ class WorkResult:
     Attributes
     ----------
     result
-        JSON-ready, without NaN.
+        JSON-ready, without NaN; on its way from the worker as its text.
     artifact
         Bytes to keep beside it.
     unfinished
         Whether the kind's follow-up is to complete the result after the job's end.
     """
 
-    result: dict[str, Any]
+    result: Mapping[str, Any]
     artifact: bytes | None = None
     unfinished: bool = False
 
 
-def _the_least(_payload: dict[str, Any]) -> float:
+def _the_least(_payload: Mapping[str, Any]) -> float:
     return 1.0
 
 
@@ -294,9 +294,9 @@ class JobKind:
     name: str
     work: str
     lane: Lane
-    on_success: Callable[[Connection, Job, WorkResult], dict[str, Any]] | None = None
+    on_success: Callable[[Connection, Job, WorkResult], Mapping[str, Any]] | None = None
     dropped_fields: frozenset[str] = frozenset()
     at_once: str | None = None
     max_run_s: float | None = None
-    effort: Callable[[dict[str, Any]], float] = _the_least
+    effort: Callable[[Mapping[str, Any]], float] = _the_least
     follow_up: FollowUp | None = None

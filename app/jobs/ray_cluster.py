@@ -102,7 +102,7 @@ class RayExecutor(SlotExecutor["_Worker"]):
     def submit(
         self,
         work: str,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         *,
         time_left_s: float | None,
         on_progress: Callable[[Progress], None],
@@ -224,7 +224,7 @@ class _RayExecution(SlotExecution[_Worker]):
         self,
         free: asyncio.Queue[_Worker],
         work: str,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         deadline: float | None,
         on_progress: Callable[[Progress], None],
         labels: dict[str, str],

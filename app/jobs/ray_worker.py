@@ -6,16 +6,18 @@ does it import Ray: the executor makes an actor of :class:`RayWorker`.
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 import traceback
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from app.jobs import worker
 from app.jobs.executor import Raised, Returned
 from app.jobs.failure import describe
 from app.jobs.model import Progress
+from app.jobs.stored_json import written
 from app.jobs.work_context import CANCEL, DEADLINE, WorkContext, new_control
 from app.jobs.worker import Ended, clean, resolve
 from app.logs import configure_worker_logs, labelled
@@ -58,7 +60,7 @@ class RayWorker:
         serial: int,
         labels: dict[str, str],
         work: str,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
     ) -> Ended:
@@ -94,8 +96,7 @@ class RayWorker:
         try:
             with labelled(labels):
                 result = resolve(work)(payload, WorkContext(report, control))
-            json.dumps(result.result, allow_nan=False)
-            outcome = Returned(result)
+            outcome = Returned(replace(result, result=written(result.result)))
         except BaseException as error:
             outcome = Raised(describe(error), traceback.format_exc())
         with self._changed:

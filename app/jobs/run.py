@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -111,7 +111,7 @@ class Runs:
         return max(attempts, key=lambda run: run.job.attempt, default=None)
 
 
-def handed_over(job: Job) -> dict[str, Any]:
+def handed_over(job: Job) -> Mapping[str, Any]:
     """Return what the work gets: the payload, and the progress of an earlier attempt if it has a plan."""
     if job.attempt == 1 or job.progress.assignment is None:
         return job.payload

@@ -58,7 +58,7 @@ from app.jobs.unfinished import UnfinishedResults, has_place
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
-OnSuccess = Callable[[Connection, Job, WorkResult], dict[str, Any]]
+OnSuccess = Callable[[Connection, Job, WorkResult], Mapping[str, Any]]
 
 
 class JobStore(JobReader):
@@ -104,7 +104,7 @@ class JobStore(JobReader):
     def insert(
         self,
         kind: JobKind,
-        payload: dict[str, Any],
+        payload: Mapping[str, Any],
         *,
         run_now: bool,
         limit: QueueLimit,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -89,7 +89,7 @@ def end(
     progress: Progress,
     now: float,
     *,
-    result: dict[str, Any] | None = None,
+    result: Mapping[str, Any] | None = None,
     error: dict[str, Any] | None = None,
     dropped: Set[str] = frozenset(),
     unfinished: bool = False,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 import importlib
-import json
 import math
 import multiprocessing
 import os
@@ -15,7 +14,7 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable, MutableSequence
+from collections.abc import Callable, Mapping, MutableSequence
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing.connection import Connection, wait
@@ -24,6 +23,7 @@ from typing import Any
 from app.jobs.executor import Raised, Returned
 from app.jobs.failure import describe
 from app.jobs.model import Progress
+from app.jobs.stored_json import written
 from app.jobs.work_context import WorkContext
 from app.logs import configure_worker_logs, labelled
 
@@ -160,7 +160,7 @@ def warm_up(hook: str | None, niceness: int, *arguments: Any) -> int:
     return os.getpid()
 
 
-def run(labels: dict[str, str], work: str, payload: dict[str, Any], serial: int) -> Ended:
+def run(labels: dict[str, str], work: str, payload: Mapping[str, Any], serial: int) -> Ended:
     """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
 
     Parameters
@@ -179,8 +179,7 @@ def run(labels: dict[str, str], work: str, payload: dict[str, Any], serial: int)
         with labelled(labels):
             result = resolve(work)(payload, WorkContext(reporter.report, control))
         # A result that is no JSON must fail here, with a traceback, and not when it is stored.
-        json.dumps(result.result, allow_nan=False)
-        outcome = Returned(result)
+        outcome = Returned(replace(result, result=written(result.result)))
     except BaseException as error:
         outcome = Raised(describe(error), traceback.format_exc())
     return Ended(outcome, reporter.end())

@@ -136,6 +136,8 @@ class Lookout:
 
     def look(self, j: int, start: Start) -> Places | None:
         """Look at all places for a visit to target `j`; None if that cannot be finished."""
+        if self.spent or self._hurry():
+            return None
         comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
         if comers == _IN_RANGE and not is_late(float(start.arrival[j]), float(self._arrays.deadline[0, j])):
             comers = _IN_TIME
@@ -144,14 +146,15 @@ class Lookout:
             np.full(2, NONE, np.int64), np.zeros(2, np.int64), np.full(2, -np.inf), np.zeros(1, np.int64),
         )  # fmt: skip
         i = 0
-        while i < self._arrays.shape[0]:
-            if self.spent or self._hurry():
-                return None
+        while True:
             i = _look(
                 self._arrays, self._plan, self._trial, self._planned, j, comers, i,
                 self._lacking, self._kept, found,
             )  # fmt: skip
-        return found
+            if i >= self._arrays.shape[0]:
+                return found
+            if self.spent or self._hurry():
+                return None
 
     def lacking(self, i: int, place: int, j: int) -> tuple[bool, float, dict[int, float]]:
         """What UAV `i` lacks for target `j` as visit `place`, if it keeps all others.

@@ -69,8 +69,16 @@ def unmet_targets(
     lookout = Lookout(arrays, plan, *scratch, hurry)
     counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
     judge = _Judge(problem, arrays, plan, needs, start, lookout, counterfactuals)
-    found = {int(j): judge.reason(int(j)) for j in urgent}
-    return tuple(found[int(j)] for j in open_targets)
+    # All of them first have a reason without looking, so that a look can end anywhere.
+    found = {j: judge.at_once(j) for j in open_targets.tolist()}
+    for looked, j in enumerate(urgent.tolist()):
+        places = lookout.look(j, start)
+        if places is None:
+            if lookout.spent:
+                found.update({rest: judge.at_once(rest) for rest in urgent[looked:].tolist()})
+            break
+        found[j] = judge.reason(j, places)
+    return tuple(found.values())
 
 
 class _Remedy(NamedTuple):
@@ -99,35 +107,42 @@ class _Judge:
         self._needs, self._lookout, self._counterfactuals = needs, lookout, counterfactuals
         self._says = Wording(problem, plan)
 
-    def reason(self, j: int) -> Unmet:
-        """Say why target `j` does not get all it needs."""
+    def at_once(self, j: int) -> Unmet:
+        """Say why target `j` does not get all it needs, as far as that is known without looking."""
+        hard = self._hard(j)
+        if hard is not None:
+            code, says, least = hard
+            return self._unmet(j, code, says, uav=None if least is None else least.uav)
+        fastest = int(self._start.fastest[j])
+        says = self._says.not_looked(fastest, self._lookout.spent)
+        return self._unmet(j, UnmetCode.NOT_CHOSEN, says, uav=fastest, verified=False)
+
+    def reason(self, j: int, places: Places) -> Unmet:
+        """Say why target `j` does not get all it needs, and what would change it."""
+        hard = self._hard(j)
+        return self._of_this_plan(j, places) if hard is None else self._of_any_plan(j, *hard, places)
+
+    def _hard(self, j: int) -> tuple[UnmetCode, str, _Remedy | None] | None:
+        """A reason that no plan could change, and the least that would; None where there is none."""
         carrier, fastest = int(self._start.carrier[j]), int(self._start.fastest[j])
-        places = self._lookout.look(j, self._start)
         if carrier == NONE:
-            return self._hard(j, UnmetCode.NO_SUPPLY, self._says.no_supply(), None, places)
+            return UnmetCode.NO_SUPPLY, self._says.no_supply(), None
         if fastest == NONE:
             missing = float(self._start.missing[j])
             least = _Remedy(carrier, 0, relaxation_for(self._problem, more_range=missing))
-            return self._hard(
-                j, UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least, places
-            )
+            return UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least
         arrival, deadline = float(self._start.arrival[j]), float(self._arrays.deadline[0, j])
         if is_late(arrival, deadline):
             late = arrival - deadline
             least = _Remedy(fastest, 0, relaxation_for(self._problem, late={j: late}))
-            return self._hard(j, UnmetCode.DEADLINE, self._says.deadline(fastest, late), least, places)
-        if places is None:
-            says = self._says.not_looked(fastest, self._lookout.spent)
-            return self._unmet(j, UnmetCode.NOT_CHOSEN, says, uav=fastest, verified=False)
-        return self._of_this_plan(j, places)
+            return UnmetCode.DEADLINE, self._says.deadline(fastest, late), least
+        return None
 
-    def _hard(
-        self, j: int, code: UnmetCode, says: str, least: _Remedy | None, places: Places | None
+    def _of_any_plan(
+        self, j: int, code: UnmetCode, says: str, least: _Remedy | None, places: Places
     ) -> Unmet:
-        """A reason that no plan could change; what a remedy earns is looked at only where there is time."""
+        """A hard reason, with the remedy that earns something, or helps at least."""
         uav = None if least is None else least.uav
-        if places is None:
-            return self._unmet(j, code, says, uav=uav)
         remedies = [
             *([] if least is None else [least]),
             *self._relaxed(j, places),

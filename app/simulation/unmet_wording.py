@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.shortfalls import RANGE, STEP, TIME
+
+_MOST_NAMED = 4
+"""Materials of which a sentence has the amounts; `remaining` has all of them."""
 
 
 class Wording:
@@ -23,12 +24,18 @@ class Wording:
 
     def __init__(self, problem: Problem, plan: FlownPlan) -> None:
         self._problem, self._plan = problem, plan
+        # Numbers of Python's are much quicker to write than numpy's.
+        self._remaining = plan.remaining.tolist()
 
     def missing(self, j: int) -> str:
         """How much target `j` lacks of what it needed."""
-        left, target = self._plan.remaining[j], self._problem.targets[j]
+        left, target = self._remaining[j], self._problem.targets[j]
         whole = target.loadlist if target.requested is None else target.requested
-        amounts = [f"{left[k]:.6g} of {whole[k]:.6g} of material {k + 1}" for k in np.flatnonzero(left > 0)]
+        lacking = [k for k, amount in enumerate(left) if amount > 0]
+        named = lacking if len(lacking) <= _MOST_NAMED + 1 else lacking[:_MOST_NAMED]
+        amounts = [f"{left[k]:.6g} of {whole[k]:.6g} of material {k + 1}" for k in named]
+        if len(named) < len(lacking):
+            amounts.append(f"{len(lacking) - len(named)} other materials")
         return " and ".join(amounts) + " missing"
 
     def no_supply(self) -> str:

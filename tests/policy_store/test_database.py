@@ -17,7 +17,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
 from sqlalchemy.exc import DatabaseError, OperationalError
 
-from app.api import stored_json
+from app.jobs import stored_json
 from policy_store import sqlite
 from policy_store.database import Database
 from policy_store.errors import (

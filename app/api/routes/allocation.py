@@ -8,10 +8,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
-from app.api import stored_json
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.allocation_payload import allocation_payload
-from app.api.job_answers import accepted, answer_of, gone, idempotency
+from app.api.job_answers import accepted, gone, idempotency, written_answer_of
 from app.api.job_kinds import ALLOCATE
 from app.api.job_models import JobModel
 from app.api.json_body import JsonRoute
@@ -96,10 +95,9 @@ async def allocate(
         job = ended
     if patience_s is not None and not job.status.finished:
         return accepted(job, preferences)
-    answer = answer_of(job)
     return Response(
         # Checked where it was made: to check it once more would hold up everybody else.
-        stored_json.write({name: answer.get(name, default) for name, default in _FIELDS.items()}),
+        written_answer_of(job, _FIELDS),
         media_type="application/json",
         headers={"Preference-Applied": preferences.applied} if preferences.applied else None,
     )

@@ -17,9 +17,9 @@ from app.api.problem_details import responses
 from app.api.problem_models import ProblemModel
 from app.api.routes.parameters import Cursor, JobId
 from app.api.services import Served
-from app.api.stored_json import write
 from app.jobs.model import JobStatus
 from app.jobs.service import JobService
+from app.jobs.stored_json import write
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
