@@ -73,7 +73,7 @@ def _class_of(effort: float) -> int:
     return int(math.log2(max(1.0, effort)))
 
 
-class LastMinute:
+class OverdueJobs:
     """Watches over jobs that wait.
 
     Parameters
