@@ -58,7 +58,7 @@ class StoredJson(Mapping[str, Any]):
 
     def _read(self) -> dict[str, Any]:
         if self._value is None:
-            value = _read(self.text)
+            value = read(self.text)
             if not isinstance(value, dict):
                 raise ValueError("it is no JSON object that can be read")
             self._value = value
@@ -93,17 +93,15 @@ def written(value: Mapping[str, Any]) -> StoredJson:
     return StoredJson(text.decode(), is_new=True)
 
 
+def read_later(stored: Any) -> Any:
+    """Return what a text holds, a large object as a :class:`StoredJson`; what is no text is that itself."""
+    if not isinstance(stored, str):
+        return stored
+    return StoredJson(stored) if len(stored) > _SMALL else read(stored)
+
+
 def read(text: str) -> Any:
-    """Read a value that was written by :func:`write`, or by an earlier version; None if nobody can.
-
-    A large object is a :class:`StoredJson`.
-    """
-    if len(text) > _SMALL and text.startswith("{"):
-        return StoredJson(text)
-    return _read(text)
-
-
-def _read(text: str) -> Any:
+    """Read a value that was written by :func:`write`, or by an earlier version; None if nobody can."""
     try:
         return from_json(text)
     except ValueError:

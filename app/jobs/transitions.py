@@ -12,6 +12,7 @@ from sqlalchemy import Connection, RowMapping
 
 from app.jobs.errors import JobNotFound
 from app.jobs.model import Job, JobStatus, JobSummary, Progress
+from app.jobs.stored_json import read_later
 from app.jobs.tables import artifacts, jobs
 
 
@@ -24,9 +25,14 @@ class Claim:
 
 
 has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
-select_jobs = sa.select(jobs, has_artifact)
+_TEXTS = {"payload", "result"}
+# As texts, which most of those who handle a job only hand on.
+_whole = [
+    sa.cast(column, sa.Text).label(column.name) if column.name in _TEXTS else column for column in jobs.c
+]
+select_jobs = sa.select(*_whole, has_artifact)
 # Payloads, results and plans may have a megabyte each.
-_LARGE = {"payload", "result", "assignment"}
+_LARGE = _TEXTS | {"assignment"}
 select_small = sa.select(*(column for column in jobs.c if column.name not in _LARGE), has_artifact)
 select_summaries = select_small.add_columns(jobs.c.assignment)
 # What is read in order to be changed is locked, where a database does not let writers take turns.
@@ -78,7 +84,7 @@ def take(which: sa.ColumnElement[bool], owner: str, now: float) -> sa.Executable
             # An earlier process may have had another idea of the time.
             started_at=sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now),
         )
-        .returning(jobs)
+        .returning(*_whole)
     )
 
 
@@ -104,7 +110,9 @@ def end(
         "unfinished": 0 if unfinished else None,
     }
     if dropped:
-        values["payload"] = {name: value for name, value in row["payload"].items() if name not in dropped}
+        values["payload"] = {
+            name: value for name, value in read_later(row["payload"]).items() if name not in dropped
+        }
     return change(connection, row, status, progress, **values)
 
 
@@ -150,7 +158,7 @@ def _time(seconds: float | None) -> datetime | None:
 
 def job_of(row: RowMapping | dict[str, Any]) -> Job:
     """Return the job that a row with ``has_artifact`` describes."""
-    return Job(**_summary(row), payload=row["payload"], result=row["result"])
+    return Job(**_summary(row), payload=read_later(row["payload"]), result=read_later(row["result"]))
 
 
 def claim_of(row: RowMapping | dict[str, Any], ahead: float) -> Claim:

@@ -13,6 +13,7 @@ from sqlalchemy import Connection, RowMapping
 
 from app.jobs.model import FINISHED, Job
 from app.jobs.reading import JobReader
+from app.jobs.stored_json import read_later
 from app.jobs.tables import DATABASE_NOW, jobs
 from app.jobs.transitions import job_of, select_jobs, select_jobs_to_change
 
@@ -94,5 +95,5 @@ def _find(connection: Connection, job_id: str, attempt: int) -> RowMapping | Non
 
 
 def _finish(connection: Connection, row: RowMapping, fields: Mapping[str, Any]) -> None:
-    values = {"result": {**row["result"], **fields}, "unfinished": None}
+    values = {"result": {**read_later(row["result"]), **fields}, "unfinished": None}
     connection.execute(sa.update(jobs).where(jobs.c.number == row["number"]).values(values))

@@ -33,6 +33,7 @@ from postgresql_server import PostgresqlServer  # noqa: E402
 from ray_nodes import RayNodes  # noqa: E402
 
 from app.domain.records import problem_to_record  # noqa: E402
+from app.jobs import stored_json  # noqa: E402
 from app.jobs.executor import Executor  # noqa: E402
 from app.jobs.local import SINGLE_THREADED, LocalExecutor  # noqa: E402
 from app.jobs.model import Job, JobKind, JobStatus  # noqa: E402
@@ -160,7 +161,7 @@ async def _ended(service: JobService, job: Job) -> None:
 
 @asynccontextmanager
 async def _services(executors: list[Executor], url: str) -> AsyncIterator[list[JobService]]:
-    databases = [Database(url) for _ in executors]
+    databases = [Database(url, stored_json.write, stored_json.read) for _ in executors]
     services = [
         JobService(database, KINDS, executor, max_queued={"batch": 100_000})
         for database, executor in zip(databases, executors, strict=True)

@@ -30,6 +30,7 @@ sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT)]
 import numpy as np  # noqa: E402
 from postgresql_server import PostgresqlServer  # noqa: E402
 
+from app.jobs import stored_json  # noqa: E402
 from app.jobs.executor import Lost, Outcome, Returned  # noqa: E402
 from app.jobs.model import JobKind, Progress, WorkResult  # noqa: E402
 from app.jobs.service import JobService  # noqa: E402
@@ -175,7 +176,7 @@ async def _serve(
 ) -> dict[str, Any]:
     """Be a service: submit, and tell how many jobs ended in time and how long the later half waited."""
     rng = np.random.default_rng(seed)
-    database = Database(url)
+    database = Database(url, stored_json.write, stored_json.read)
     service = JobService(database, [KIND], TimedExecutor(capacity), max_queued={"batch": PLACES})
     await service.start()
     begun = time.monotonic()

@@ -9,6 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from app.jobs import stored_json
 from app.jobs.executor import Executor
 from app.jobs.local import LocalExecutor
 from app.jobs.model import Job, JobKind, JobStatus, WorkResult
@@ -56,10 +57,15 @@ def url_of(folder: Path) -> str:
     return f"sqlite:///{folder / 'jobs.db'}"
 
 
+def database_of(url: str) -> Database:
+    """Open a database as the service does."""
+    return Database(url, stored_json.write, stored_json.read)
+
+
 @asynccontextmanager
 async def running(where: Path | str, *, grace_s: float = 0.0, **settings: Any) -> AsyncIterator[JobService]:
     """Run a service on the database of a folder, or of a URL, with all workers warm."""
-    database = Database(where if isinstance(where, str) else url_of(where))
+    database = database_of(where if isinstance(where, str) else url_of(where))
     service = make_service(database, **settings)
     await service.start()
     try:

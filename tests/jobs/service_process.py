@@ -3,13 +3,11 @@
 import asyncio
 import sys
 
-from harness import GATED, LEASE_S, eventually, make_service
-
-from policy_store.database import Database
+from harness import GATED, LEASE_S, database_of, eventually, make_service
 
 
 async def main(url: str, gate: str, count: int) -> None:
-    service = make_service(Database(url), kinds=(GATED,), slots=2, lease_s=LEASE_S)
+    service = make_service(database_of(url), kinds=(GATED,), slots=2, lease_s=LEASE_S)
     await service.start()
     for number in range(count):
         job, _ = await service.submit("gated", {"path": gate, "number": number})

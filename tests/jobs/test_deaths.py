@@ -1,6 +1,7 @@
 """Workers and services that are killed, by SIGKILL and in the midst of work."""
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -9,12 +10,22 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import sqlalchemy as sa
-from harness import GATED, KINDS, PATIENCE_S, eventually, finished, make_service, reports, running, url_of
+from harness import (
+    GATED,
+    KINDS,
+    PATIENCE_S,
+    database_of,
+    eventually,
+    finished,
+    make_service,
+    reports,
+    running,
+    url_of,
+)
 
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobStatus
 from app.jobs.service import JobService
-from policy_store.database import Database
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -107,7 +118,7 @@ def test_every_accepted_job_of_a_killed_service_is_finished_once(tmp_path):
             assert attempts == [2, 2, 1, 1, 1, 1]
 
     asyncio.run(scenario())
-    database = Database(url_of(tmp_path))
+    database = database_of(url_of(tmp_path))
     with database.read() as connection:
         completions = connection.scalars(sa.text("SELECT job_id FROM completions")).all()
     database.dispose()
@@ -116,7 +127,7 @@ def test_every_accepted_job_of_a_killed_service_is_finished_once(tmp_path):
 
 def test_progress_of_a_long_job_survives_a_crash(tmp_path):
     async def scenario():
-        database = Database(url_of(tmp_path))
+        database = database_of(url_of(tmp_path))
         service = make_service(database)
         await service.start()
         job, _ = await service.submit("until_file", {"path": str(tmp_path / "gate")})
@@ -126,7 +137,7 @@ def test_progress_of_a_long_job_survives_a_crash(tmp_path):
         def stored() -> bool:
             with database.read() as connection:
                 progress = connection.scalar(sa.text("SELECT progress FROM jobs"))
-            return f'"epoch": {shown.epoch}' in progress
+            return json.loads(progress)["epoch"] == shown.epoch
 
         await eventually(stored)
         (tmp_path / "gate").touch()
@@ -138,7 +149,7 @@ def test_progress_of_a_long_job_survives_a_crash(tmp_path):
 
 def test_workers_are_single_threaded_warm_and_light(tmp_path):
     async def scenario():
-        database = Database(url_of(tmp_path))
+        database = database_of(url_of(tmp_path))
         before = dict(os.environ)
         executor = LocalExecutor(1, warm_up="job_work:warm_up")
         service = JobService(database, KINDS, executor)

@@ -5,12 +5,11 @@ import time
 from pathlib import Path
 
 import pytest
-from harness import KINDS, eventually, finished, running
+from harness import KINDS, database_of, eventually, finished, running
 
 from app.jobs.local import LocalExecutor
 from app.jobs.model import FollowUp, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore, QueueLimit
-from policy_store.database import Database
 
 GIVEN_UP = {"rest": "never"}
 OTHER_HALF = FollowUp("job_work:other_half", GIVEN_UP)
@@ -99,7 +98,7 @@ def test_it_makes_way_for_an_answer_and_is_begun_anew(tmp_path):
 
 @pytest.fixture
 def table(any_database_url):
-    database = Database(any_database_url)
+    database = database_of(any_database_url)
     store = JobStore(database, "host:1:1:me", 3)
     store.migrate()
     yield store, store.unfinished
@@ -171,7 +170,7 @@ def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
 
 
 def test_services_that_share_a_database_complete_their_own_first(postgresql, monkeypatch):
-    database = Database(postgresql.new_database())
+    database = database_of(postgresql.new_database())
     store = JobStore(database, "host:1:1:me", 3)
     store.migrate()
     job = ended(store)

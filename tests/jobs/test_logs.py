@@ -3,17 +3,16 @@
 import asyncio
 import json
 
-from harness import KINDS, eventually, finished, url_of
+from harness import KINDS, database_of, eventually, finished, url_of
 from structlog.contextvars import bound_contextvars
 
 from app.jobs.local import LocalExecutor
 from app.jobs.service import JobService
-from policy_store.database import Database
 
 
 def test_lines_of_a_worker_are_json_and_have_the_ids(tmp_path, capfd):
     async def scenario():
-        database = Database(url_of(tmp_path))
+        database = database_of(url_of(tmp_path))
         service = JobService(database, KINDS, LocalExecutor(1, log_level="info"))
         await service.start()
         await eventually(lambda: service.load().ready == 1)

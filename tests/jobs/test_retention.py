@@ -5,14 +5,13 @@ import time
 
 import pytest
 import sqlalchemy as sa
-from harness import eventually, finished, running, url_of
+from harness import database_of, eventually, finished, running, url_of
 
 from app.jobs.errors import JobNotFound
 from app.jobs.failure import failure
 from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore, QueueLimit
 from app.jobs.tables import artifacts, idempotency_keys, jobs
-from policy_store.database import Database
 
 KIND = JobKind("solve", "nowhere:solve", "interactive", dropped_fields=frozenset({"weights"}))
 ROOM = QueueLimit(100, 1.0)
@@ -21,7 +20,7 @@ DAY_S = 86_400.0
 
 @pytest.fixture
 def database(tmp_path):
-    database = Database(url_of(tmp_path))
+    database = database_of(url_of(tmp_path))
     yield database
     database.dispose()
 
@@ -126,7 +125,7 @@ def test_the_service_forgets_by_itself_and_keeps_what_runs(tmp_path):
         async with running(tmp_path) as service:
             old, _ = await service.submit("echo", {"artifact": "w"})
             await finished(service, old)
-        database = Database(url_of(tmp_path))
+        database = database_of(url_of(tmp_path))
         age(database, old, 2)
         async with running(tmp_path, retention_s=DAY_S) as service:
 
@@ -149,7 +148,7 @@ def test_without_a_retention_nothing_is_forgotten(tmp_path):
         async with running(tmp_path) as service:
             old, _ = await service.submit("echo", {})
             await finished(service, old)
-        database = Database(url_of(tmp_path))
+        database = database_of(url_of(tmp_path))
         age(database, old, 10_000)
         async with running(tmp_path) as service:
             job, _ = await service.submit("until_stopped", {})

@@ -13,7 +13,18 @@ from signal import SIGINT, SIGKILL, SIGQUIT
 
 import pytest
 import sqlalchemy as sa
-from harness import GATED, KINDS, LEASE_S, PATIENCE_S, eventually, finished, make_service, reports, running
+from harness import (
+    GATED,
+    KINDS,
+    LEASE_S,
+    PATIENCE_S,
+    database_of,
+    eventually,
+    finished,
+    make_service,
+    reports,
+    running,
+)
 from postgresql_server import PostgresqlServer
 from sqlalchemy.exc import OperationalError
 from structlog.contextvars import bound_contextvars
@@ -24,7 +35,6 @@ from app.jobs.lease import Lease
 from app.jobs.local import LocalExecutor
 from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore, QueueLimit
-from policy_store.database import Database
 
 HERE = Path(__file__).parent
 
@@ -43,14 +53,14 @@ async def two_services(url, **settings):
 
 def make_completions(url):
     """Make the table in which the harness counts completions, before several services would at once."""
-    database = Database(url)
+    database = database_of(url)
     with database.write() as connection:
         connection.execute(sa.text("CREATE TABLE completions (job_id TEXT)"))
     database.dispose()
 
 
 def completions_of(url):
-    database = Database(url)
+    database = database_of(url)
     with database.read() as connection:
         found = connection.scalars(sa.text("SELECT job_id FROM completions")).all()
     database.dispose()
@@ -136,7 +146,7 @@ def test_one_key_makes_one_job_and_the_queue_has_one_limit_for_all(url, tmp_path
 
 
 def test_of_those_who_take_a_job_out_of_its_turn_at_once_one_gets_it(url):
-    stores = [JobStore(Database(url), name, 3) for name in ("one", "other")]
+    stores = [JobStore(database_of(url), name, 3) for name in ("one", "other")]
     stores[0].migrate()
     hasty = JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:note")
     with ThreadPoolExecutor(2) as threads:
@@ -171,7 +181,7 @@ def test_one_whose_time_is_up_is_answered_once_though_several_watch_over_it(url,
                 cold = LocalExecutor(1, warm_up="job_work:never")
                 return {**options, "reserve": LocalExecutor(1), "executor": cold}
 
-            databases = [Database(url) for _ in range(2)]
+            databases = [database_of(url) for _ in range(2)]
             services = [make_service(database, **slow()) for database in databases]
             await asyncio.gather(*(service.start() for service in services))
             done = [await finished(busy, job) for job in jobs]
@@ -266,7 +276,7 @@ def test_a_restart_of_the_database_loses_nothing(how, tmp_path):
 
 def test_nobody_is_judged_before_all_had_the_time_to_show_themselves(url):
     now = [1000.0]
-    database = Database(url)
+    database = database_of(url)
     JobStore(database, "a", 3).migrate()
     judge, other = (Lease(database, name, 10.0, clock=lambda: now[0]) for name in ("judge", "other"))
 
@@ -320,7 +330,7 @@ def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(url):
 def test_a_service_that_takes_its_own_job_again_loses_no_worker(url, tmp_path):
     async def scenario():
         async with running(url, slots=2, lease_s=LEASE_S) as one:
-            database = Database(url)
+            database = database_of(url)
             judge = JobStore(database, "judge", 3)
             job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
             await reports(one, job)
@@ -347,7 +357,7 @@ def test_the_id_of_a_request_reaches_the_worker_of_another_service(url, capfd):
     async def scenario():
         loud = LocalExecutor(1, log_level="info")
         async with running(url, executor=loud, max_queued=1000) as other:
-            database = Database(url)
+            database = database_of(url)
             cold = LocalExecutor(1, warm_up="job_work:never")
             one = make_service(database, executor=cold, max_queued=1000)
             await one.start()
@@ -367,7 +377,7 @@ def test_the_id_of_a_request_reaches_the_worker_of_another_service(url, capfd):
 
 def test_times_are_those_of_the_database_whatever_a_machine_thinks(url):
     hours = 3600.0
-    database = Database(url)
+    database = database_of(url)
     astray = JobStore(database, "astray", 3, clock=Clock(lambda: time.time() + 10 * hours))
     right = JobStore(database, "right", 3)
     astray.migrate()

@@ -8,7 +8,7 @@ import pytest
 import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from harness import url_of
+from harness import database_of, url_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +17,6 @@ from app.jobs.failure import failure
 from app.jobs.model import Job, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import VERSION_TABLE, JobStore, QueueLimit
 from app.jobs.tables import metadata
-from policy_store.database import Database
 
 KIND = JobKind("solve", "nowhere:solve", "interactive")
 ROOM = QueueLimit(100, 1.0)
@@ -26,7 +25,7 @@ SOME = Progress(0.5, best_reward=1.5)
 
 @pytest.fixture
 def database(any_database_url):
-    database = Database(any_database_url)
+    database = database_of(any_database_url)
     yield database
     database.dispose()
 
@@ -136,7 +135,7 @@ ACTIONS = ("claim", "succeed", "fail", "lose", "release", "cancel", "recover", "
 @given(st.lists(st.tuples(st.sampled_from(ACTIONS), st.integers(0, 1), st.integers(0, 2)), max_size=25))
 def test_no_order_of_events_finishes_a_job_twice(steps):
     with TemporaryDirectory() as folder:
-        database = Database(url_of(Path(folder)))
+        database = database_of(url_of(Path(folder)))
         store = JobStore(database, "host:1:1:me", 3)
         store.migrate()
         ids = [add(store).id for _ in range(2)]
