@@ -320,7 +320,8 @@ def test_symbols_move_in_the_problem_only(page, service):
 
 
 def settled(page):
-    """Wait until the map has its size and is drawn."""
+    """Wait until the map has its size, stands still and is drawn."""
+    expect(page.locator(".leaflet-pan-anim, .leaflet-zoom-anim")).to_have_count(0)
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
