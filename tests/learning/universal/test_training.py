@@ -9,11 +9,11 @@ from referee import replay
 
 from app.domain.records import problem_to_record
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.network.policy import UniversalPolicy, initial
 from app.learning.universal.training import trainer
 from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
 from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard
-from app.learning.universal.training.trainer import Schedule, fit, initial
+from app.learning.universal.training.trainer import Schedule, fit
 from app.simulation import simulator
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
