@@ -21,7 +21,7 @@ _REMEMBERED = 16
 _UNMEASURED_S = 0.02
 """What an answer of the least effort is expected to take before one was measured."""
 
-_CAUTION = 2.0
+_CAUTION = 1.5
 _LEAD_S = 0.03
 """Out of the queue, and from the disk to the client: what every group takes once."""
 
@@ -157,7 +157,7 @@ def latest_start(waits: Iterable[Wait], pace: Pace) -> float:
     waits
         Those that wait, at least one.
     pace
-        How long each takes; it is expected to take twice that.
+        How long each takes; it is expected to take half as long again.
     """
     latest, all_s = math.inf, _LEAD_S
     for wait in sorted(waits):

@@ -26,12 +26,12 @@ def paced(seconds, effort=1.0, times=5):
 
 
 def test_the_last_of_those_that_end_together_is_in_time_too():
-    # Each is expected to take twice that, and the way there and back is taken once.
+    # Each is expected to take half as long again, and the way there and back is taken once.
     pace = paced(0.2)
-    assert latest_start([Wait(100.0)], pace) == pytest.approx(100.0 - 0.4 - 0.03)
-    assert latest_start([Wait(100.0)] * 3, pace) == pytest.approx(100.0 - 3 * 0.4 - 0.03)
-    assert latest_start([Wait(110.0), Wait(100.0)], pace) == pytest.approx(100.0 - 0.4 - 0.03)
-    assert latest_start([Wait(100.2), Wait(100.0)], pace) == pytest.approx(100.2 - 2 * 0.4 - 0.03)
+    assert latest_start([Wait(100.0)], pace) == pytest.approx(100.0 - 0.3 - 0.03)
+    assert latest_start([Wait(100.0)] * 3, pace) == pytest.approx(100.0 - 3 * 0.3 - 0.03)
+    assert latest_start([Wait(110.0), Wait(100.0)], pace) == pytest.approx(100.0 - 0.3 - 0.03)
+    assert latest_start([Wait(100.2), Wait(100.0)], pace) == pytest.approx(100.2 - 2 * 0.3 - 0.03)
     assert latest_start([Wait(100.0)], Pace()) < 100.0
 
 
