@@ -79,11 +79,19 @@ def open_sqlite(
 
 
 def _make(path: Path) -> None:
-    """Make a file and its folder that only their owner can read, where they are missing."""
+    """Make a file and its folder that only their owner can read, where they are missing.
+
+    A file that is there is never opened: to close it again would take away the locks that this process's
+    connections have on it (https://sqlite.org/howtocorrupt.html, 2.2), and other processes would go on as if
+    there were none.
+    """
     try:
         path.parent.mkdir(parents=True, mode=0o700, exist_ok=True)
         # SQLite gives its log beside the file the same rights.
-        os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
+    except FileExistsError:
+        if not path.is_file() or not os.access(path, os.R_OK | os.W_OK):
+            raise DatabaseUnusable(str(path), "it is no file that can be read and written") from None
     except OSError as error:
         raise DatabaseUnusable(str(path), str(error)) from error
     if not os.access(path.parent, os.W_OK):
