@@ -471,3 +471,21 @@ def test_json_is_written_and_read_as_the_opener_says(any_database_url: str, valu
             assert connection.scalars(sa.select(table.c.body)).all() == [value, value]
         database.dispose()
     assert calls == ["write", "read", "read"]
+
+
+def test_another_object_of_the_file_takes_no_locks_of_the_process_away(tmp_path: Path) -> None:
+    file = tmp_path / "library.db"
+    database = Database(f"sqlite:///{file}")
+    with database.write() as connection:
+        connection.execute(text("CREATE TABLE t (a INTEGER)"))
+    with database.read() as connection:
+        connection.execute(text("SELECT * FROM t")).all()
+        other = Database(f"sqlite:///{file}")
+        program = (
+            "import sqlite3, sys; c = sqlite3.connect(sys.argv[1]); c.execute('SELECT * FROM t'); c.close()"
+        )
+        subprocess.run([sys.executable, "-c", f"{program}; c.close()", str(file)], check=True)
+        # Who closes the last connection removes the log: that process did not take itself for the last.
+        assert Path(f"{file}-wal").exists()
+    other.dispose()
+    database.dispose()
