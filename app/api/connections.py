@@ -242,7 +242,8 @@ class BoundedProtocol(H11Protocol):
             if message["type"] == "http.response.start" and self.conn.their_state is h11.SEND_BODY:
                 # The client has to know that no other request is taken (RFC 9112, 9.6).
                 message = {**message, "headers": [*message["headers"], (b"connection", b"close")]}
-                self.cycle.transport = _KeptOpen(self.transport)  # type: ignore[assignment]
+                kept_open = _KeptOpen(self.transport)
+                self.cycle.transport = kept_open  # type: ignore[assignment]  # it hands all else on
             await send(message)
 
         names = {name for name, _ in scope["headers"]}
