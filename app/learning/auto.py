@@ -12,7 +12,8 @@ from app.domain.problem import Problem
 from app.learning.universal.episodes.effort import roll_out_work
 from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.explain import rewards_of
-from app.simulation.simulator import ALLOWED, new_episodes
+from app.simulation.simulator import new_episodes
+from app.simulation.visit import ALLOWED
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import Search, actions_of, new_search, set_routes
 from app.solvers.local_search.solver import how_long, search_on, watching

@@ -35,7 +35,8 @@ from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.explain import reward_of
-from app.simulation.simulator import ALLOWED, act, end_step, new_episodes, verdict
+from app.simulation.simulator import act, end_step, new_episodes, verdict
+from app.simulation.visit import ALLOWED
 
 _RESOLUTION = 1e5
 """Units of distance and of time that the problem's extent has; both optimisers count in integers."""

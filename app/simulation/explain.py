@@ -10,7 +10,7 @@ from app.domain.allocation import Allocation, Route, Stop
 from app.domain.errors import IllegalPlan
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.unloading import best_deliveries
@@ -147,11 +147,11 @@ def _replayed(
 
 def _refuse_illegal(problem: Problem, actions: Actions, result: simulator.Replay) -> None:
     rule = int(result.rule[0])
-    if rule == simulator.ALLOWED:
+    if rule == visit.ALLOWED:
         return
     step, i = int(result.step[0]), int(result.uav[0])
     uav = problem.uavs[i].id
     raise IllegalPlan(
-        f"step {step + 1}, {uav}: action {actions[step, i]} is not allowed: {simulator.RULES[rule]}",
-        details={"step": step + 1, "uav_id": uav, "rule": simulator.RULES[rule]},
+        f"step {step + 1}, {uav}: action {actions[step, i]} is not allowed: {visit.RULES[rule]}",
+        details={"step": step + 1, "uav_id": uav, "rule": visit.RULES[rule]},
     )

@@ -8,17 +8,16 @@ differently.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from app.domain.problem import ROUNDING
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.compilation import njit
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.unloading import NONE
+from app.simulation.visit import inlined
 
 MARK, QUEUED, CHANGED, WORK, MADE, HELPS = range(6)
 """Places in ``Trial.tally``."""
@@ -28,14 +27,6 @@ GAIN, TURNOVER = range(2)
 
 _ROUNDING_OF_VALUES = 1e-6
 """Share of two values that differ which counts as turned over: their difference has the rounding of both."""
-
-_INLINED: dict[str, Any] = {"inline": "always", "_nrt": False}
-inlined: Callable[[simulator.Function], simulator.Function] = njit(**_INLINED)
-"""For small functions, and those with one caller: they are compiled as a part of their callers.
-
-Whatever is compiled by itself takes long where all the arrays of a plan are its arguments, and once more in
-each of its callers. Functions that are not inlined take only the arrays that they need.
-"""
 
 
 class Trial(NamedTuple):
@@ -137,7 +128,7 @@ def gain_of_visit(
             # As it was until now, but the need of the target that it visits has changed.
             x = visits.target[h, s]
             take_up(plan, trial, h, s)
-            if simulator.verdict(arrays, episodes, 0, h, x) == simulator.ALLOWED:
+            if simulator.verdict(arrays, episodes, 0, h, x) == visit.ALLOWED:
                 exchange(total, plan.value[h, s], simulator.act(arrays, episodes, 0, h, x))
                 same = True
                 for k in range(plan.load.shape[2]):
@@ -159,7 +150,7 @@ def gain_of_visit(
                 x = j if q == NONE else visits.target[h, q]
                 before = 0.0 if q == NONE else plan.value[h, q]
                 need_at(plan, trial, x, slot)
-                if simulator.verdict(arrays, episodes, 0, h, x) == simulator.ALLOWED:
+                if simulator.verdict(arrays, episodes, 0, h, x) == visit.ALLOWED:
                     exchange(total, before, simulator.act(arrays, episodes, 0, h, x))
                     _open(visits.first, visits.following, trial, x, slot)
                     if q == NONE:
@@ -178,7 +169,7 @@ def gain_of_visit(
                 charge(total, -plan.value[h, q])
         if arrays.charge_return[0]:
             back = simulator.leg_home(arrays, episodes, 0, h)
-            exchange(total, -arrays.weight[0] * plan.back[h], -arrays.weight[0] * back)
+            exchange(total, -visit.cost_of(arrays, 0, plan.back[h]), -visit.cost_of(arrays, 0, back))
     if trial.target_mark[j] == mark:
         lacked, lacks = 0.0, 0.0
         for k in range(plan.load.shape[2]):
@@ -196,15 +187,15 @@ def gain_of_undisturbed_visit(
 
     The UAV and the target are as they are in the plan at that place.
     """
-    weight, total = arrays.weight[0], trial.total
+    total = trial.total
     trial.tally[MADE] = 1
     charge(total, simulator.act(arrays, trial.episodes, 0, i, j))
     if place < plan.visits.length[i]:
-        leg = arrays.between[0, j, plan.visits.target[i, place]]
-        exchange(total, -weight * plan.leg[i, place], -weight * leg)
+        leg = visit.leg(arrays, 0, i, j, plan.visits.target[i, place])
+        exchange(total, -visit.cost_of(arrays, 0, plan.leg[i, place]), -visit.cost_of(arrays, 0, leg))
     elif arrays.charge_return[0]:
         back = simulator.leg_home(arrays, trial.episodes, 0, i)
-        exchange(total, -weight * plan.back[i], -weight * back)
+        exchange(total, -visit.cost_of(arrays, 0, plan.back[i]), -visit.cost_of(arrays, 0, back))
     return gain(total)
 
 
@@ -261,7 +252,7 @@ def gain(total: Floats) -> float:
 @inlined
 def move_to(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
     """Put UAV `i` where it is in the plan before its visit `place`."""
-    trial.episodes.at[0, i] = simulator.START if place == 0 else plan.visits.target[i, place - 1]
+    trial.episodes.at[0, i] = visit.START if place == 0 else plan.visits.target[i, place - 1]
     trial.episodes.flown[0, i] = plan.flown[i, place]
     trial.episodes.clock[0, i] = plan.clock[i, place]
     trial.episodes.ret[0, i] = False

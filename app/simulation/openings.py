@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
@@ -21,14 +21,14 @@ from app.simulation.insertion import (
     begin,
     gain_of_undisturbed_visit,
     gain_of_visit,
-    inlined,
     is_undisturbed,
     move_to,
     need_at,
     take_up,
 )
 from app.simulation.planned_insertion import ADDS, ALL_KEPT, ONLY_LOOK, PlannedTrial, gain_of_planned_visit
-from app.simulation.shortfalls import RANGE, STEP, TIME, detour, is_late, lacking
+from app.simulation.shortfalls import RANGE, STEP, TIME, detour, lacking
+from app.simulation.visit import inlined
 
 _WORK = 2_000_000
 """Visits flown for all areas of an answer: some tenths of a second. Beyond, no more are looked at."""
@@ -139,7 +139,9 @@ class Lookout:
         if self.spent or self._hurry():
             return None
         comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
-        if comers == _IN_RANGE and not is_late(float(start.arrival[j]), float(self._arrays.deadline[0, j])):
+        if comers == _IN_RANGE and not visit.is_late(
+            float(start.arrival[j]), float(self._arrays.deadline[0, j])
+        ):
             comers = _IN_TIME
         found = Places(
             np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
@@ -170,7 +172,7 @@ class Lookout:
             route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
             for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
                 deadline = float(self._arrays.deadline[0, x])
-                if is_late(deadline + after, deadline):
+                if visit.is_late(deadline + after, deadline):
                     late[x] = max(after, late.get(x, 0.0))
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
 
@@ -180,17 +182,15 @@ def _carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
     """Whether a UAV can be sent and carries, at first, something that a target still needs at the end."""
     useful = False
     for k in range(plan.remaining.shape[1]):
-        useful = useful or (arrays.load[0, i, k] > 0.0 and plan.remaining[j, k] > 0.0)
+        useful = useful or visit.can_unload(arrays.load[0, i, k], plan.remaining[j, k])
     return bool(useful and not arrays.ret[0, i])
 
 
 @inlined
 def _missing(arrays: ProblemArrays, i: int, j: int) -> float:
     """Range that a UAV lacks to fly to a target directly; negative where it has more than that."""
-    reach: float = arrays.dis[0, i] + arrays.start_target[0, i, j]
-    if arrays.return_to_base[0]:
-        reach += arrays.home[0, i, j]
-    missing: float = reach - arrays.voyage[0, i]
+    flown = arrays.dis[0, i] + visit.leg(arrays, 0, i, visit.START, j)
+    missing: float = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.voyage[0, i]
     return missing
 
 
@@ -205,8 +205,8 @@ def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, 
             missing = _missing(arrays, i, j)
             if missing < start.missing[j]:
                 start.missing[j], start.carrier[j] = missing, i
-            if arrays.voyage[0, i] + missing <= simulator.farthest(arrays.voyage[0, i]):
-                arrival = arrays.start_target[0, i, j] / arrays.speed[0, i]
+            if arrays.voyage[0, i] + missing <= visit.farthest(arrays.voyage[0, i]):
+                arrival = visit.arrival_after(arrays, 0, i, 0.0, visit.leg(arrays, 0, i, visit.START, j))
                 if arrival < start.arrival[j]:
                     start.arrival[j], start.fastest[j] = arrival, i
 
@@ -215,8 +215,9 @@ def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, 
 def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) -> bool:
     """Whether a UAV counts among those that could come: carriers, those in range, or those in time too."""
     voyage = arrays.voyage[0, i]
-    in_range = voyage + _missing(arrays, i, j) <= simulator.farthest(voyage)
-    in_time = not is_late(arrays.start_target[0, i, j] / arrays.speed[0, i], arrays.deadline[0, j])
+    in_range = voyage + _missing(arrays, i, j) <= visit.farthest(voyage)
+    arrival = visit.arrival_after(arrays, 0, i, 0.0, visit.leg(arrays, 0, i, visit.START, j))
+    in_time = not visit.is_late(arrival, arrays.deadline[0, j])
     near = (comers < _IN_RANGE or in_range) and (comers < _IN_TIME or in_time)
     return near and _carries(arrays, plan, i, j)
 
@@ -315,11 +316,11 @@ def _is_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, plac
     legal = bool(place < arrays.max_steps[0])
     if legal:
         move_to(plan, trial, i, place)
-        legal = simulator.reach_verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+        legal = simulator.reach_verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     if legal:
         take_up(plan, trial, i, place)
         need_at(plan, trial, j, place * plan.back.shape[0] + i)
-        legal = simulator.verdict(arrays, trial.episodes, 0, i, j) == simulator.ALLOWED
+        legal = simulator.verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     return legal
 
 
@@ -351,8 +352,8 @@ def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) ->
     still = 0.0
     for k in range(plan.remaining.shape[1]):
         still += plan.remaining[j, k]
-    hope: float = arrays.level[0, j] * still / arrays.need_total[0, j]
-    hope -= arrays.weight[0] * detour(arrays, plan, i, place, j)
+    hope: float = visit.earned_by(arrays, 0, j, still)
+    hope -= visit.cost_of(arrays, 0, detour(arrays, plan, i, place, j))
     return hope
 
 

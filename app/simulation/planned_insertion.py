@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import ROUNDING
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
@@ -27,9 +27,9 @@ from app.simulation.insertion import (
     charge,
     exchange,
     gain,
-    inlined,
 )
 from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve, visits_of
+from app.simulation.visit import inlined
 from app.simulation.visit_lists import connected, move_slot
 
 ONLY_LOOK = -2
@@ -153,7 +153,7 @@ def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: P
     """Fly the UAV's route with the additional visit, and note what stays legal; say whether all does."""
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     episodes, length = trial.episodes, plan.visits.length[i]
-    episodes.at[0, i] = simulator.START
+    episodes.at[0, i] = visit.START
     episodes.flown[0, i], episodes.clock[0, i] = arrays.dis[0, i], 0.0
     steps, whole = 0, True
     # Number s, then the additional visit where it comes before it.
@@ -165,7 +165,7 @@ def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: P
         x = j if additional else plan.visits.target[i, s]
         trial.tally[WORK] += 1
         legal = steps < arrays.max_steps[0] and (
-            simulator.reach_verdict(arrays, episodes, 0, i, x) == simulator.ALLOWED
+            simulator.reach_verdict(arrays, episodes, 0, i, x) == visit.ALLOWED
         )
         if legal:
             simulator.fly_to(arrays, episodes, 0, i, x)
@@ -277,7 +277,7 @@ def _can_unload(load: Floats, need: Floats, visits: Visits, amount: Floats, i: i
     """
     m = visits.length.shape[0]
     for k in range(amount.shape[1]):
-        if load[0, i, k] <= 0.0 or need[0, j, k] <= 0.0:
+        if not visit.can_unload(load[0, i, k], need[0, j, k]):
             continue
         left = load[0, i, k]
         for s in range(visits.length[i]):
@@ -302,23 +302,23 @@ def _charge_way(
     j: int,
 ) -> None:
     """Charge the legs of a route that differ from the plan's: `j` is added, ``left_out`` are not flown."""
-    length, weight = visits.length[h], arrays.weight[0]
-    at = before = simulator.START
+    length = visits.length[h]
+    at = before = visit.START
     for s in range(length + 1):
         if s == place:
-            charge(total, -weight * (arrays.start_target[0, h, j] if at < 0 else arrays.between[0, at, j]))
+            charge(total, -visit.cost_of(arrays, 0, visit.leg(arrays, 0, h, at, j)))
             at = j
         if s == length:
             break
         x = visits.target[h, s]
         if left_out[s]:
-            charge(total, weight * leg[h, s])
+            charge(total, visit.cost_of(arrays, 0, leg[h, s]))
         else:
             if at != before:
-                now = arrays.start_target[0, h, x] if at < 0 else arrays.between[0, at, x]
-                exchange(total, -weight * leg[h, s], -weight * now)
+                now = visit.leg(arrays, 0, h, at, x)
+                exchange(total, -visit.cost_of(arrays, 0, leg[h, s]), -visit.cost_of(arrays, 0, now))
             at = x
         before = x
     if arrays.charge_return[0] and at != before:
-        now = arrays.start_home[0, h] if at < 0 else arrays.home[0, h, at]
-        exchange(total, -weight * back[h], -weight * now)
+        now = visit.way_home(arrays, 0, h, at)
+        exchange(total, -visit.cost_of(arrays, 0, back[h]), -visit.cost_of(arrays, 0, now))

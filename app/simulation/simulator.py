@@ -8,16 +8,35 @@ stack of problems, the batch of episodes, and the episode's index; functions ove
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from app.domain.problem import ROUNDING
-from app.domain.problem import TOLERANCE as TOLERANCE  # noqa: PLC0414 - one of the rules, exported from here
+from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-
-Function = TypeVar("Function", bound=Callable[..., Any])
+from app.simulation.visit import (
+    ALLOWED,
+    NO_SUCH_ACTION,
+    OUT_OF_RANGE,
+    RETURNING,
+    START,
+    TOO_LATE,
+    TOO_MANY_STEPS,
+    TOO_MUCH,
+    UNLOADS_NOTHING,
+    Function,
+    arrival_after,
+    can_unload,
+    cost_of,
+    departure_after,
+    earned_by,
+    is_late,
+    is_out_of_range,
+    left_of,
+    leg,
+    way_home,
+)
 
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 compiled: Callable[[Function], Function] = njit(**_OPTIONS)
@@ -29,29 +48,6 @@ arrays costs 6 ns instead of 340. Allocate in Python or in an ordinary ``njit`` 
 
 compiled_free: Callable[[Function], Function] = njit(nogil=True, **_OPTIONS)
 """The same, and other threads run meanwhile: for the outermost function of long work."""
-
-ALLOWED = 0
-RETURNING = 1
-OUT_OF_RANGE = 2
-TOO_LATE = 3
-UNLOADS_NOTHING = 4
-NO_SUCH_ACTION = 5
-TOO_MANY_STEPS = 6
-TOO_MUCH = 7
-
-RULES = {
-    RETURNING: "a returning UAV gets no more targets",
-    OUT_OF_RANGE: "the visit, and the way home where it is required, exceed the voyage",
-    TOO_LATE: "it arrives after the deadline",
-    UNLOADS_NOTHING: "it would unload nothing",
-    NO_SUCH_ACTION: "there is no such action",
-    TOO_MANY_STEPS: "the plan has more rows than max_steps",
-    TOO_MUCH: "it would unload more than the UAV carries or the area needs",
-}
-"""What :func:`verdict` and :func:`replay` return for an action that is not allowed, in words."""
-
-START = -1
-"""Value of ``Episodes.at`` for a UAV that is still where the request has it."""
 
 
 class Episodes(NamedTuple):
@@ -172,21 +168,13 @@ def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
 @compiled
 def leg_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
     """Distance from where UAV `i` is to target `j` (rule 1 of section 3)."""
-    p, at = episodes.problem[b], episodes.at[b, i]
-    if at == START:
-        return arrays.start_target[p, i, j]
-    return arrays.between[p, at, j]
+    return leg(arrays, episodes.problem[b], i, episodes.at[b, i], j)
 
 
 @compiled
 def leg_home(arrays: ProblemArrays, episodes: Episodes, b: int, i: int) -> float:
     """Distance from where UAV `i` is to its starting point."""
-    p, at = episodes.problem[b], episodes.at[b, i]
-    if at == START:
-        return arrays.start_home[p, i]
-    if at == arrays.level.shape[1]:
-        return 0.0
-    return arrays.home[p, i, at]
+    return way_home(arrays, episodes.problem[b], i, episodes.at[b, i])
 
 
 @compiled
@@ -196,7 +184,7 @@ def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -
         return RETURNING
     useful = False
     for k in range(episodes.load.shape[2]):
-        if episodes.load[b, i, k] > 0.0 and episodes.need[b, j, k] > 0.0:
+        if can_unload(episodes.load[b, i, k], episodes.need[b, j, k]):
             useful = True
             break
     if not useful:
@@ -209,26 +197,11 @@ def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: 
     """Range and deadline of rule 2: ``ALLOWED``, ``OUT_OF_RANGE`` or ``TOO_LATE``, whatever is unloaded."""
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
-    reach = episodes.flown[b, i] + d
-    if arrays.return_to_base[p]:
-        reach += arrays.home[p, i, j]
-    if reach > farthest(arrays.voyage[p, i]):
+    if is_out_of_range(arrays, p, i, j, episodes.flown[b, i] + d):
         return OUT_OF_RANGE
-    if episodes.clock[b, i] + d / arrays.speed[p, i] > latest(arrays.deadline[p, j]):
+    if is_late(arrival_after(arrays, p, i, episodes.clock[b, i], d), arrays.deadline[p, j]):
         return TOO_LATE
     return ALLOWED
-
-
-@compiled
-def farthest(voyage: float) -> float:
-    """Distance that a range allows, with the tolerance of rule 2."""
-    return voyage * (1.0 + TOLERANCE)
-
-
-@compiled
-def latest(deadline: float) -> float:
-    """Time at which a deadline allows to arrive, with the tolerance of rule 2."""
-    return deadline + abs(deadline) * TOLERANCE
 
 
 @compiled
@@ -248,7 +221,7 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
         if not arrays.charge_return[p]:
             return 0.0
         episodes.distance[b] += d
-        return -arrays.weight[p] * d
+        return -cost_of(arrays, p, d)
     d = fly_to(arrays, episodes, b, i, action)
     earned = 0.0
     for k in range(episodes.load.shape[2]):
@@ -260,9 +233,9 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
                 earned += unload(arrays, episodes, b, i, action, k, unloaded)
             else:
                 episodes.load[b, i, k], episodes.need[b, action, k] = load - unloaded, need - unloaded
-                earned += arrays.level[p, action] * unloaded / arrays.need_total[p, action]
+                earned += earned_by(arrays, p, action, unloaded)
     episodes.satisfaction[b] += earned
-    return earned - arrays.weight[p] * d
+    return earned - cost_of(arrays, p, d)
 
 
 @compiled
@@ -270,8 +243,8 @@ def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) ->
     """Take UAV `i` to target `j` and through its service time (rules 1 and 3); return the leg's length."""
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
-    episodes.clock[b, i] += d / arrays.speed[p, i]
-    episodes.clock[b, i] += arrays.service[p, j]
+    arrival = arrival_after(arrays, p, i, episodes.clock[b, i], d)
+    episodes.clock[b, i] = departure_after(arrays, p, j, arrival)
     episodes.flown[b, i] += d
     episodes.at[b, i] = j
     episodes.distance[b] += d
@@ -284,22 +257,7 @@ def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k:
     p = episodes.problem[b]
     episodes.load[b, i, k] = left_of(episodes.load[b, i, k], amount, arrays.load[p, i, k])
     episodes.need[b, j, k] = left_of(episodes.need[b, j, k], amount, arrays.requested[p, j, k])
-    return arrays.level[p, j] * amount / arrays.need_total[p, j]
-
-
-@compiled
-def left_of(amount: float, taken: float, whole: float) -> float:
-    """What is left of a load or need after some of it was taken; rounding of the whole is nothing.
-
-    Parameters
-    ----------
-    amount, taken
-        What there was, and what is taken from it.
-    whole
-        What the amount is a part of: the first load, or what was requested.
-    """
-    left = amount - taken
-    return left if left >= ROUNDING * whole else 0.0
+    return earned_by(arrays, p, j, amount)
 
 
 @compiled

@@ -17,6 +17,7 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
+from app.simulation.visit import worths
 
 NONE = -1
 """End of a linked list, and of a path."""
@@ -85,9 +86,7 @@ class Unloading(NamedTuple):
 def new_unloading(arrays: ProblemArrays) -> Unloading:
     """Make the scratch space for the first problem of a stack."""
     m, n, k = arrays.shape
-    needed = arrays.need_total[0] > 0
-    worth = np.zeros(n)
-    worth[needed] = arrays.level[0][needed] / arrays.need_total[0][needed]
+    worth = worths(arrays)
     order = np.argsort(-worth, kind="stable")
     rank = np.empty(n, np.int64)
     rank[order] = np.arange(n)

@@ -29,8 +29,9 @@ from app.simulation.openings import (
     look_from_start,
 )
 from app.simulation.planned_insertion import new_planned_trial
-from app.simulation.shortfalls import RANGE, STEP, TIME, is_late
+from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.unmet_wording import Wording
+from app.simulation.visit import is_late
 
 _RELAXED = (STEP, RANGE, TIME, STEP + RANGE, STEP + TIME, RANGE + TIME, STEP + RANGE + TIME)
 """What a visit may lack, fewest things first."""

@@ -18,7 +18,8 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.compilation import njit
-from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.simulation.simulator import Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.simulation.visit import ALLOWED
 from app.solvers.parameters import GeneticParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.seeds import seed_sequence

@@ -13,7 +13,6 @@ from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.explain import reward_of
 from app.simulation.simulator import (
-    ALLOWED,
     Episodes,
     act,
     compiled,
@@ -23,6 +22,7 @@ from app.simulation.simulator import (
     new_episodes,
     verdict,
 )
+from app.simulation.visit import ALLOWED, cost_of, earned_by, way_home
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.stop import never
@@ -103,7 +103,7 @@ def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int)
     best, chosen = 0.0, arrays.level.shape[1]
     if episodes.ret[0, i]:
         return chosen
-    carried, weight = episodes.load[0, i].sum(), arrays.weight[0]
+    carried = episodes.load[0, i].sum()
     back = leg_home(arrays, episodes, 0, i) if arrays.charge_return[0] else 0.0
     for j in range(arrays.level.shape[1]):
         # What it earns at most is known at once, and mostly too little; the margin is for rounding errors.
@@ -112,16 +112,16 @@ def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int)
             continue
         way = leg_to(arrays, episodes, 0, i, j)
         if arrays.charge_return[0]:
-            way += arrays.home[0, i, j] - back
-        cost = weight * way
-        if arrays.level[0, j] * most / arrays.need_total[0, j] - cost <= best:
+            way += way_home(arrays, 0, i, j) - back
+        cost = cost_of(arrays, 0, way)
+        if earned_by(arrays, 0, j, most) - cost <= best:
             continue
         if verdict(arrays, episodes, 0, i, j) != ALLOWED:
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
             unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
-        gain = arrays.level[0, j] * unloaded / arrays.need_total[0, j]
+        gain = earned_by(arrays, 0, j, unloaded)
         earned = gain - cost
         # Of equals the first, whatever rounding makes of them.
         if earned > best + _ROUNDING * gain:

@@ -6,7 +6,8 @@ from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.observations import features_of, write_states
 from app.library.description import task_description
 from app.simulation.arrays import compile_problem
-from app.simulation.simulator import ALLOWED, act, end_step, new_episodes, verdict
+from app.simulation.simulator import act, end_step, new_episodes, verdict
+from app.simulation.visit import ALLOWED
 
 
 def test_state_at_the_beginning_is_the_task_description():

@@ -12,7 +12,7 @@ from app.domain.errors import IllegalPlan
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.simulation import simulator
+from app.simulation import visit
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import explain, reward_of, rewards_of
 from app.solvers.greedy import greedy_plan
@@ -84,7 +84,7 @@ def test_a_remainder_just_above_the_limit_counts_and_one_below_does_not():
             objective=Objective(0.0),
         )
         plan = np.array([[[0, 0]]])
-        assert (rewards_of(compile_problem(problem), plan).rule[0] == simulator.ALLOWED) == counts
+        assert (rewards_of(compile_problem(problem), plan).rule[0] == visit.ALLOWED) == counts
         try:
             replay(problem_to_record(problem), plan[0].tolist())
             agreed = True

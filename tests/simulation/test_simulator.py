@@ -13,17 +13,17 @@ from app.domain.errors import IllegalPlan
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.arrays import compile_problem, stack
 from app.simulation.explain import explain, reward_of, rewards_of
 
 RULES = {
-    "returning": simulator.RETURNING,
-    "range": simulator.OUT_OF_RANGE,
-    "late": simulator.TOO_LATE,
-    "useless": simulator.UNLOADS_NOTHING,
-    "action": simulator.NO_SUCH_ACTION,
-    "steps": simulator.TOO_MANY_STEPS,
+    "returning": visit.RETURNING,
+    "range": visit.OUT_OF_RANGE,
+    "late": visit.TOO_LATE,
+    "useless": visit.UNLOADS_NOTHING,
+    "action": visit.NO_SUCH_ACTION,
+    "steps": visit.TOO_MANY_STEPS,
 }
 
 
@@ -68,7 +68,7 @@ def test_agrees_with_the_referee_on_ten_thousand_plans():
             expected, broken = judged(record, plan)
             if broken is None:
                 legal += 1
-                assert result.rule[0] == simulator.ALLOWED
+                assert result.rule[0] == visit.ALLOWED
                 assert result.reward[0] == pytest.approx(expected["reward"], abs=1e-9, rel=1e-9)
                 assert result.satisfaction[0] == pytest.approx(expected["satisfaction"], abs=1e-9)
                 assert result.distance[0] == pytest.approx(expected["distance"], abs=1e-9, rel=1e-9)
@@ -136,9 +136,9 @@ def test_range_counts_the_way_home_with_a_relative_tolerance(change, legal):
     problem = triangle()  # a then b: 3 + 4 out, 5 home
     problem = replace(problem, uavs=(replace(problem.uavs[0], **change),))
     result = rewards_of(compile_problem(problem), np.array([[[0], [1]]]))
-    assert (result.rule[0] == simulator.ALLOWED) == legal
+    assert (result.rule[0] == visit.ALLOWED) == legal
     one_way = replace(problem, objective=Objective(0.1, return_to_base=False))
-    assert rewards_of(compile_problem(one_way), np.array([[[0], [1]]])).rule[0] == simulator.ALLOWED
+    assert rewards_of(compile_problem(one_way), np.array([[[0], [1]]])).rule[0] == visit.ALLOWED
 
 
 def test_service_time_delays_the_next_arrival():

@@ -16,7 +16,7 @@ from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.explain import reward_of, rewards_of
 from app.simulation.generator import generate
-from app.simulation.simulator import UNLOADS_NOTHING
+from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
 from app.solvers.local_search.ceiling import most_satisfaction

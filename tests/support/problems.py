@@ -6,7 +6,7 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Objective, Problem
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate
 
@@ -103,7 +103,7 @@ def random_plan(problem: Problem, rng: np.random.Generator) -> Plan:
         row = []
         for i in range(problem.n_uavs):
             rules = [simulator.verdict(arrays, episodes, 0, i, j) for j in range(problem.n_targets)]
-            allowed = [j for j, rule in enumerate(rules) if rule == simulator.ALLOWED]
+            allowed = [j for j, rule in enumerate(rules) if rule == visit.ALLOWED]
             stays = not allowed or rng.random() < 0.15
             row.append(problem.n_targets if stays else int(rng.choice(allowed)))
             simulator.act(arrays, episodes, 0, i, row[-1])

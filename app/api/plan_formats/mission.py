@@ -15,6 +15,7 @@ from enum import IntEnum, StrEnum
 from app.api.plan_formats.errors import OutOfRange
 from app.api.plan_formats.flown_plan import FlownRoute, FlownStop
 from app.api.problem_details import FieldError
+from app.domain.problem import TOLERANCE
 
 MIN_ALTITUDE_M, MAX_ALTITUDE_M = 1.0, 10_000.0
 MAX_SERVO_CHANNEL = 32
@@ -25,8 +26,6 @@ MIN_SPEED_M_S, MAX_SPEED_M_S = 0.1, 300.0
 MAX_HOLD_S = 65_535.0
 """Autopilots keep the seconds of a delay in 16 bits."""
 MAX_ITEMS = 65_535
-_RANGE_TOLERANCE = 1e-6
-"""The simulator's own when it compares distances with ranges."""
 
 
 class Command(IntEnum):
@@ -259,7 +258,7 @@ def _place_violations(at: str, x: float, y: float) -> Iterator[FieldError]:
 
 
 def _range_violations(at: str, route: FlownRoute, where: str, left: float) -> Sequence[FieldError]:
-    if left >= -_RANGE_TOLERANCE * max(1.0, route.uav.voyage):
+    if left >= -TOLERANCE * max(1.0, route.uav.voyage):
         return ()
     detail = f"{route.uav.id!r} would be {-left:g} km beyond its range of {route.uav.voyage:g} km {where}"
     return (FieldError(pointer=f"{at}/range_left", detail=detail),)

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from app.learning.paper.observations import Float32s
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import ALLOWED, Episodes, act, compiled, end_step, verdict
+from app.simulation.simulator import Episodes, act, compiled, end_step, verdict
+from app.simulation.visit import ALLOWED
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ from app.learning.paper.architecture import NetworkSizes
 from app.learning.paper.environment import swarm_sizes
 from app.learning.paper.observations import Float32s, features_of, write_states
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, compile_problem
-from app.simulation.simulator import ALLOWED, Episodes, act, compiled, end_step, new_episodes, reset, verdict
+from app.simulation.simulator import Episodes, act, compiled, end_step, new_episodes, reset, verdict
+from app.simulation.visit import ALLOWED
 
 MAX_JOINT_ACTIONS = 20_000
 """Largest joint action space, (N+1)^M, for which values are learned one by one."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import ALLOWED, Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.simulation.simulator import Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.simulation.visit import ALLOWED, limits
 from app.solvers.bound.instance import Instance
 from app.solvers.bound.relaxation import Pools, Priced
 from app.solvers.bound.target_sets import SLACK, Members, TargetSets
@@ -93,12 +94,12 @@ class JointPlans:
         pool = pools.sets[i]
         # The pool may have lost sets since the prices were evaluated.
         worth = self._worth(priced, i, pool)
+        ranges, deadlines = limits(arrays, SLACK)
         targets, length, slack = _orders(
             own.members, own.size, own.cost, pool, priced.best[i] - worth, room, instance.price,
             int(arrays.max_steps[0]), arrays.start_target[0, i], arrays.between[0], arrays.home[0, i],
             float(arrays.speed[0, i]),
-            float(arrays.voyage[0, i]) * (1.0 + SLACK) - float(arrays.dis[0, i]),
-            arrays.deadline[0] + SLACK * np.abs(arrays.deadline[0]), arrays.service[0],
+            float(ranges[i] - arrays.dis[0, i]), deadlines, arrays.service[0],
             bool(arrays.return_to_base[0]), bool(arrays.charge_return[0]), _MOST_ROUTES, _MOST_ORDERS,
         )  # fmt: skip
         if len(length) >= _MOST_ROUTES:

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Floats, Integers
 from app.simulation.compilation import njit
-from app.simulation.simulator import TOLERANCE
+from app.simulation.visit import limits
 from app.solvers.bound.instance import Instance
 from app.solvers.protocol import StopCriterion
 from app.solvers.stop import never
@@ -68,6 +69,7 @@ def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSe
         return TargetSets(
             np.empty((0, 1), np.int16), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
         )
+    ranges, deadlines = limits(arrays, SLACK)
     binomial = np.array([[comb(a, b) for b in range(longest + 2)] for a in range(n + 1)], np.int64)
     given = (
         binomial,
@@ -75,8 +77,8 @@ def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSe
         np.ascontiguousarray(arrays.between[0][np.ix_(targets, targets)]),
         np.ascontiguousarray(arrays.home[0, i, targets]),
         float(arrays.speed[0, i]),
-        float(arrays.voyage[0, i]) * (1.0 + SLACK) - float(arrays.dis[0, i]),
-        arrays.deadline[0, targets] + SLACK * np.abs(arrays.deadline[0, targets]),
+        float(ranges[i] - arrays.dis[0, i]),
+        deadlines[targets],
         np.ascontiguousarray(arrays.service[0, targets]),
         bool(arrays.return_to_base[0]),
         bool(arrays.charge_return[0]),

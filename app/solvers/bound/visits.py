@@ -11,8 +11,9 @@ import numpy as np
 
 from app.simulation.arrays import Floats
 from app.simulation.compilation import njit
-from app.simulation.simulator import TOLERANCE
+from app.simulation.visit import first_visits
 from app.solvers.bound.instance import Instance, ceiling, safely
+from app.solvers.bound.target_sets import SLACK
 from app.solvers.protocol import StopCriterion
 
 _ROUNDS = 3000
@@ -105,12 +106,7 @@ def _shortest_legs(instance: Instance) -> Floats:
     """Return the least a visit costs, (M, N); infinite where it is not possible at all."""
     arrays = instance.arrays
     legs = _nearest_legs(arrays.start_target[0], arrays.between[0])
-    reach = arrays.dis[0][:, None] + arrays.start_target[0]
-    if arrays.return_to_base[0]:
-        reach += arrays.home[0]
-    possible = instance.useful & (reach <= arrays.voyage[0][:, None] * (1.0 + 2.0 * TOLERANCE))
-    latest = arrays.deadline[0] + 2.0 * TOLERANCE * np.abs(arrays.deadline[0])
-    possible &= arrays.start_target[0] / arrays.speed[0][:, None] * (1.0 - 1e-12) <= latest[None, :]
+    possible = instance.useful & first_visits(arrays, SLACK)
     return np.where(possible, instance.price * legs, np.inf)
 
 

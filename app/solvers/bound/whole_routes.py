@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.simulator import TOLERANCE
+from app.domain.problem import TOLERANCE
 from app.solvers.bound.instance import Instance, safely
 from app.solvers.column_generation.packing import Packing, reachable, worth
 from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool

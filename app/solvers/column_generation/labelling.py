@@ -16,8 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import TOLERANCE, compiled, compiled_free
+from app.simulation.simulator import compiled, compiled_free
+from app.simulation.visit import limits
 from app.solvers.column_generation.packing import worth
 from app.solvers.column_generation.pool import Pool, collect
 from app.solvers.local_search.routes import NONE, lay
@@ -157,8 +159,8 @@ def means_of(arrays: ProblemArrays, i: int, needed: Floats, tolerance: float = T
     """
     speed, visits = float(arrays.speed[0, i]), min(int(arrays.max_steps[0]), arrays.level.shape[1])
     start, home, service = arrays.start_target[0, i], arrays.home[0, i], arrays.service[0]
-    latest = arrays.deadline[0] + np.abs(arrays.deadline[0]) * tolerance
-    reach = np.broadcast_to(arrays.voyage[0, i] * (1.0 + tolerance), start.shape) - arrays.dis[0, i]
+    ranges, latest = limits(arrays, tolerance)
+    reach = np.broadcast_to(ranges[i], start.shape) - arrays.dis[0, i]
     if arrays.return_to_base[0]:
         reach = reach - home
     rows = []

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import TOLERANCE, compiled
+from app.simulation.simulator import compiled
 from app.solvers.local_search.routes import NONE, charged_distance
 
 CAPACITY = 8192

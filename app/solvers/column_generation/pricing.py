@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import TOLERANCE
 from app.solvers.column_generation.labelling import (
     Ground,
     Labels,

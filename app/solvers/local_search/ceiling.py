@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.arrays import Flags, ProblemArrays
-from app.simulation.simulator import TOLERANCE
+from app.domain.problem import TOLERANCE
+from app.simulation.arrays import ProblemArrays
+from app.simulation.visit import first_visits, worths
 
 
 def most_satisfaction(arrays: ProblemArrays) -> float:
@@ -20,10 +21,10 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
         A stack of one problem.
     """
     wanted = arrays.need_total[0] > 0
-    worth = arrays.level[0][wanted] / arrays.need_total[0][wanted]
+    worth = worths(arrays)[wanted]
     need = arrays.need[0][wanted]
     load = np.where(arrays.ret[0][:, None], 0.0, arrays.load[0])
-    direct = _direct(arrays)[:, wanted]
+    direct = first_visits(arrays)[:, wanted]
     # As a product of matrices: with many materials much quicker than looking at each UAV's.
     served = direct.T.astype(np.float32) @ (load > 0).astype(np.float32) > 0
     order = np.argsort(-worth, kind="stable")
@@ -31,14 +32,3 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
     before = np.cumsum(most, axis=0) - most
     unloaded = np.clip(load.sum(axis=0) - before, 0.0, most)
     return float((worth[order] @ unloaded).sum()) * (1.0 + TOLERANCE)
-
-
-def _direct(arrays: ProblemArrays) -> Flags:
-    """(M, N) whether a UAV that flies to a target at once is in range and in time."""
-    leg = arrays.start_target[0]
-    reach = arrays.dis[0][:, None] + leg
-    if arrays.return_to_base[0]:
-        reach = reach + arrays.home[0]
-    latest = arrays.deadline[0]
-    in_range = reach <= arrays.voyage[0][:, None] * (1.0 + TOLERANCE)
-    return in_range & (leg / arrays.speed[0][:, None] <= latest + np.abs(latest) * TOLERANCE)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled, left_of
+from app.simulation.simulator import compiled
+from app.simulation.visit import earned_by, left_of
 from app.solvers.local_search.routes import (
     DISTANCE,
     NONE,
@@ -270,7 +271,7 @@ def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) 
         unloaded = min(load, need)
         if unloaded > 0.0:
             useless = False
-            earned += arrays.level[0, j] * unloaded / arrays.need_total[0, j]
+            earned += earned_by(arrays, 0, j, unloaded)
     routes.earned[slot], routes.useless[slot] = earned, useless
     routes.total[SATISFACTION] += earned
     if useless:

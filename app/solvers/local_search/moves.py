@@ -11,6 +11,7 @@ import numpy as np
 
 from app.simulation.arrays import Flags, Integers, ProblemArrays
 from app.simulation.simulator import compiled
+from app.simulation.visit import START, cost_of, earned_by, leg, way_home
 from app.solvers.local_search.change import Change, propose
 from app.solvers.local_search.routes import NONE, Routes
 
@@ -85,13 +86,10 @@ def _find_reluctant(arrays: ProblemArrays, near_start: Integers, reluctant: Flag
             unloaded = 0.0
             for k in range(arrays.load.shape[2]):
                 unloaded += min(arrays.load[0, i, k], arrays.need[0, j, k])
-            way = arrays.start_target[0, i, j]
+            way = leg(arrays, 0, i, START, j)
             if arrays.charge_return[0]:
-                way += arrays.home[0, i, j] - arrays.start_home[0, i]
-            if (
-                unloaded > 0.0
-                and arrays.level[0, j] * unloaded < arrays.weight[0] * way * arrays.need_total[0, j]
-            ):
+                way += way_home(arrays, 0, i, j) - way_home(arrays, 0, i, START)
+            if unloaded > 0.0 and earned_by(arrays, 0, j, unloaded) < cost_of(arrays, 0, way):
                 reluctant[i] = True
                 break
 

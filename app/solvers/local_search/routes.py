@@ -13,7 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import TOLERANCE, compiled
+from app.simulation.simulator import compiled
+from app.simulation.visit import (
+    START,
+    arrival_after,
+    departure_after,
+    is_late,
+    is_out_of_range,
+    leg,
+    way_home,
+)
 
 NONE = -1
 """End of a linked list."""
@@ -125,21 +134,16 @@ def lay(
     flown, clock
         (S+1,) overwritten from ``begin + 1`` on.
     """
-    limit = arrays.voyage[0, i] * (1.0 + TOLERANCE) - arrays.dis[0, i]
     for s in range(begin, length):
         j = targets[s]
-        leg = arrays.start_target[0, i, j] if s == 0 else arrays.between[0, targets[s - 1], j]
-        flown[s + 1] = flown[s] + leg
-        reach = flown[s + 1]
-        if arrays.return_to_base[0]:
-            reach += arrays.home[0, i, j]
-        if reach > limit:
+        way = leg(arrays, 0, i, START if s == 0 else targets[s - 1], j)
+        flown[s + 1] = flown[s] + way
+        if is_out_of_range(arrays, 0, i, j, arrays.dis[0, i] + flown[s + 1]):
             return False
-        arrival = clock[s] + leg / arrays.speed[0, i]
-        latest = arrays.deadline[0, j]
-        if arrival > latest + abs(latest) * TOLERANCE:
+        arrival = arrival_after(arrays, 0, i, clock[s], way)
+        if is_late(arrival, arrays.deadline[0, j]):
             return False
-        clock[s + 1] = arrival + arrays.service[0, j]
+        clock[s + 1] = departure_after(arrays, 0, j, arrival)
     return True
 
 
@@ -160,5 +164,5 @@ def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: i
     """Distance of a route as far as it costs reward."""
     distance = flown[length]
     if arrays.charge_return[0] and not arrays.ret[0, i]:
-        distance += arrays.start_home[0, i] if length == 0 else arrays.home[0, i, targets[length - 1]]
+        distance += way_home(arrays, 0, i, START if length == 0 else targets[length - 1])
     return distance

@@ -17,16 +17,19 @@ import numpy as np
 from app.learning.compute.kernels import Float32s
 from app.learning.universal.network.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import (
+from app.simulation.simulator import Episodes, compiled, leg_home, leg_to, verdict
+from app.simulation.visit import (
     ALLOWED,
-    Episodes,
-    compiled,
-    farthest,
-    latest,
+    arrival_after,
+    cost_of,
+    departure_after,
+    earned_by,
+    flown_with_return,
+    is_late,
+    is_out_of_range,
     left_of,
-    leg_home,
-    leg_to,
-    verdict,
+    leg,
+    way_home,
 )
 
 FOLLOW_UPS = 16
@@ -135,8 +138,8 @@ def _value(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int,
     unloaded = 0.0
     for k in range(episodes.load.shape[2]):
         unloaded += min(episodes.load[b, i, k], episodes.need[b, j, k])
-    cost = arrays.weight[p] * leg_to(arrays, episodes, b, i, j)
-    gains.net[b, i, j] = arrays.level[p, j] * unloaded / arrays.need_total[p, j] - cost
+    cost = cost_of(arrays, p, leg_to(arrays, episodes, b, i, j))
+    gains.net[b, i, j] = earned_by(arrays, p, j, unloaded) - cost
     gains.unloaded[b, i, j] = unloaded
 
 
@@ -195,15 +198,15 @@ def observe(
         allowed = net > FORBIDDEN
         allowed_visits += allowed
         d = leg_to(arrays, episodes, b, i, j)
-        home_then = arrays.home[p, i, j]
+        home_then = way_home(arrays, p, i, j)
         need = 0.0
         for k in range(episodes.need.shape[2]):
             need += episodes.need[b, j, k]
         unloaded = gains.unloaded[b, i, j]
-        value = arrays.level[p, j] * unloaded / max(arrays.need_total[p, j], 1e-300)
-        cost = arrays.weight[p] * d
-        reach = episodes.flown[b, i] + d + (home_then if arrays.return_to_base[p] else 0.0)
-        travel = d / arrays.speed[p, i]
+        value = earned_by(arrays, p, j, unloaded) if unloaded > 0.0 else 0.0
+        cost = cost_of(arrays, p, d)
+        reach = flown_with_return(arrays, p, i, j, episodes.flown[b, i] + d)
+        travel = arrival_after(arrays, p, i, 0.0, d)
         deadline = arrays.deadline[p, j]
 
         best, second, rival, able, supply = FORBIDDEN, FORBIDDEN, -1, 0, 0.0
@@ -351,14 +354,13 @@ def _follow_up(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: 
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
     flown = episodes.flown[b, i] + d
-    clock = episodes.clock[b, i] + d / arrays.speed[p, i] + arrays.service[p, j]
+    clock = departure_after(arrays, p, j, arrival_after(arrays, p, i, episodes.clock[b, i], d))
     best = 0.0
     for q in range(gains.near.shape[2]):
         then = gains.near[p, j, q]
-        leg = arrays.between[p, j, then]
-        reach = flown + leg + (arrays.home[p, i, then] if arrays.return_to_base[p] else 0.0)
-        arrival = clock + leg / arrays.speed[p, i]
-        if reach > farthest(arrays.voyage[p, i]) or arrival > latest(arrays.deadline[p, then]):
+        way = leg(arrays, p, i, j, then)
+        arrival = arrival_after(arrays, p, i, clock, way)
+        if is_out_of_range(arrays, p, i, then, flown + way) or is_late(arrival, arrays.deadline[p, then]):
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
@@ -366,6 +368,5 @@ def _follow_up(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: 
             kept = left_of(load, min(load, episodes.need[b, j, k]), arrays.load[p, i, k])
             unloaded += min(kept, episodes.need[b, then, k])
         if unloaded > 0.0:
-            earned = arrays.level[p, then] * unloaded / arrays.need_total[p, then] - arrays.weight[p] * leg
-            best = max(best, earned)
+            best = max(best, earned_by(arrays, p, then, unloaded) - cost_of(arrays, p, way))
     return best

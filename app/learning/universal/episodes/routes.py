@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import ALLOWED, START, Episodes, act, reset_one, verdict
+from app.simulation.simulator import Episodes, act, reset_one, verdict
+from app.simulation.visit import ALLOWED, START
 
 NOBODY = -1
 

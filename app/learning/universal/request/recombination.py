@@ -17,7 +17,8 @@ from app.learning.universal.episodes.routes import fly_last, fly_routes
 from app.simulation.arrays import Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.explain import rewards_of
-from app.simulation.simulator import ALLOWED, Episodes, new_episodes
+from app.simulation.simulator import Episodes, new_episodes
+from app.simulation.visit import ALLOWED
 from app.solvers.protocol import StopCriterion
 
 _KEPT = 128

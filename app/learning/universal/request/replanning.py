@@ -18,7 +18,8 @@ from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import ALLOWED, Episodes, act, new_episodes, reset_one, verdict
+from app.simulation.simulator import Episodes, act, new_episodes, reset_one, verdict
+from app.simulation.visit import ALLOWED, START, cost_of, earned_by, leg
 from app.solvers.protocol import StopCriterion, none_spare
 from app.solvers.stop import never
 
@@ -224,8 +225,8 @@ def _leave(
                 unloaded = 0.0
                 for k in range(episodes.load.shape[2]):
                     unloaded += min(episodes.load[g, i, k], episodes.need[g, j, k])
-                earned = arrays.level[0, j] * unloaded / arrays.need_total[0, j]
-                worth[j] = max(worth[j], earned - arrays.weight[0] * arrays.start_target[0, i, j])
+                cost = cost_of(arrays, 0, leg(arrays, 0, i, START, j))
+                worth[j] = max(worth[j], earned_by(arrays, 0, j, unloaded) - cost)
     for i in range(plan.shape[1]):
         if group[i]:
             for s in range(plan.shape[0]):
