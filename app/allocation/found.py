@@ -11,7 +11,7 @@ from app.domain.errors import AllocatorError
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.jobs.model import BEST_KNOWN
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers import protocol
 
 _log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.learning.universal.episodes.effort import roll_out_work
 from app.simulation.arrays import Integers, ProblemArrays, compile_problem
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 from app.simulation.simulator import new_episodes
 from app.simulation.visit import ALLOWED
 from app.solvers.greedy import greedy_plan

@@ -1,11 +1,11 @@
-"""QMIX from scratch: Algorithm 1, or in service mode :mod:`app.learning.universal.request.scratch`."""
+"""QMIX from scratch: Algorithm 1, or in service mode :mod:`app.learning.universal.request.from_scratch`."""
 
 from __future__ import annotations
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode
-from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.compute.threads import one_thread
 from app.learning.paper.architecture import NetworkSizes, QmixConfig
 from app.learning.paper.environment import SwarmEnvironment
@@ -16,7 +16,7 @@ from app.learning.paper.random_streams import RandomStreams, random_streams
 from app.learning.paper.replay_buffer import ReplayBuffer
 from app.learning.paper.trainer import Incumbent, Trainer, Training
 from app.learning.parameters import LearningParameters, QmixParameters, TableParameters
-from app.learning.universal.request.scratch import UniversalScratch, fits
+from app.learning.universal.request.from_scratch import UniversalFromScratch, fits
 from app.simulation.arrays import compile_problem
 from app.solvers.protocol import Report, Solution, SolverContext, StopCriterion
 
@@ -130,7 +130,7 @@ class Qmix:
         parameters = self._parameters
         if parameters.mode == "service" and fits(compile_problem(problem)):
             with one_thread():
-                return UniversalScratch(problem, parameters, seed, stop, report).run()
+                return UniversalFromScratch(problem, parameters, seed, stop, report).run()
         table, used = parameters.table(), parameters.in_paper()
         config = qmix_config(problem, table)
         require_memory(table, config.sizes, problem.max_steps, table.drqn_hidden_dim)
@@ -139,7 +139,7 @@ class Qmix:
             network = QmixNetwork(
                 config.sizes, table.drqn_hidden_dim, table.qmix_hidden_dim, streams.initialisation
             )
-            in_time = TimeForCheckpoint(stop, network)
+            in_time = CheckpointReserve(stop, network)
             training = train(problem, network, table, streams, in_time, report)
             checkpoint = (
                 encode(

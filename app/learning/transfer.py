@@ -13,7 +13,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode
-from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.checkpoints.source_policies import Source, SourcePolicies
 from app.learning.compute.threads import one_thread
 from app.learning.paper.networks import QmixNetwork
@@ -101,7 +101,7 @@ def _fine_tune(
     used = parameters.table().model_copy(update=hidden)
     config = qmix_config(problem, used)
     require_memory(used, config.sizes, problem.max_steps, used.drqn_hidden_dim)
-    in_time = TimeForCheckpoint(stop, network)
+    in_time = CheckpointReserve(stop, network)
     training = train(problem, network, used, random_streams(seed), in_time, report)
     parameters = parameters.model_copy(update=used.model_dump())
     learned = (

@@ -34,7 +34,7 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.simulator import act, end_step, new_episodes, verdict
 from app.simulation.visit import ALLOWED
 

@@ -96,7 +96,7 @@ def compile_problem(problem: Problem) -> ProblemArrays:
 
     A problem does not change, and a job asks for the same one again and again, in the search, beside it and
     when the plan is explained: the newest problem's arrays are kept as long as the problem lives. They are
-    for reading; who wants others makes a copy.
+    for reading; copy it before changing it.
     """
     global _newest  # noqa: PLW0603 - one entry, replaced as a whole
     known = _newest

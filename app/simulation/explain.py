@@ -7,40 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from app.domain.allocation import Allocation, Route, Stop
-from app.domain.errors import IllegalPlan
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation import simulator, visit
+from app.simulation import simulator
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
-from app.simulation.unloading import best_deliveries
+from app.simulation.evaluation import replayed
 from app.simulation.unmet import unmet_targets
-
-
-def rewards_of(arrays: ProblemArrays, plans: Actions) -> simulator.Replay:
-    """Replay plans of the first problem of a stack, with greedy unloading.
-
-    Parameters
-    ----------
-    arrays
-        The stack.
-    plans
-        (B, S, M) actions.
-    """
-    return simulator.replay(arrays, plans, np.zeros(len(plans), np.int64))
-
-
-def reward_of(problem: Problem, plan: Plan) -> float:
-    """Compute the reward of a plan; with planned unloading, that of its best deliveries.
-
-    Raises
-    ------
-    IllegalPlan
-        If one of its actions is not allowed.
-    """
-    actions = plan.as_array()
-    result, _ = _replayed(problem, compile_problem(problem), actions)
-    return float(result.reward[0])
 
 
 def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: False) -> Allocation:
@@ -63,7 +36,7 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     """
     arrays = compile_problem(problem)
     actions = plan.as_array()
-    result, given = _replayed(problem, arrays, actions)
+    result, given = replayed(problem, arrays, actions)
 
     # Nobody is sent home in this replay: at its end every UAV is still at its last stop, which is where the
     # leg home begins and where one more visit would begin.
@@ -128,30 +101,3 @@ def _trace(
             simulator.act(arrays, episodes, 0, i, j)
     for i in range(actions.shape[1]):
         return_legs[i] = simulator.leg_home(arrays, episodes, 0, i)
-
-
-def _replayed(
-    problem: Problem, arrays: ProblemArrays, actions: Actions
-) -> tuple[simulator.Replay, Floats | None]:
-    """Replay a plan by the problem's rule of unloading; also return the deliveries if they are planned."""
-    if problem.objective.unloading == "greedy":
-        result, delivered = rewards_of(arrays, actions[None]), None
-    else:
-        # Rows and actions are looked at here already, as the deliveries are worked out before the replay.
-        sound = len(actions) <= problem.max_steps and 0 <= actions.min() <= actions.max() <= problem.n_targets
-        delivered = best_deliveries(arrays, actions) if sound else np.zeros((*actions.shape, arrays.shape[2]))
-        result = simulator.replay_delivering(arrays, actions, delivered)
-    _refuse_illegal(problem, actions, result)
-    return result, delivered
-
-
-def _refuse_illegal(problem: Problem, actions: Actions, result: simulator.Replay) -> None:
-    rule = int(result.rule[0])
-    if rule == visit.ALLOWED:
-        return
-    step, i = int(result.step[0]), int(result.uav[0])
-    uav = problem.uavs[i].id
-    raise IllegalPlan(
-        f"step {step + 1}, {uav}: action {actions[step, i]} is not allowed: {visit.RULES[rule]}",
-        details={"step": step + 1, "uav_id": uav, "rule": visit.RULES[rule]},
-    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.unloading import Visits, visits_of
+from app.simulation.deliveries import Visits, visits_of
 
 
 class FlownPlan(NamedTuple):

@@ -15,8 +15,8 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.deliveries import NONE
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.unloading import NONE
 from app.simulation.visit import inlined
 
 MARK, QUEUED, CHANGED, WORK, MADE, HELPS = range(6)

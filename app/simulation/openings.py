@@ -1,4 +1,4 @@
-"""What an area with needs left could still get: who could come, and where one more visit fits into a plan.
+"""What an area with needs left could still get: which UAVs could come, and where one more visit fits into a plan.
 
 Facts only; :mod:`app.simulation.unmet` says what follows from them. Every place in the route of every UAV is
 looked at, and what a visit there does is exact, not guessed.
@@ -46,7 +46,7 @@ _COMERS, _IN_RANGE, _IN_TIME = range(3)
 
 
 class Start(NamedTuple):
-    """Who could come to each target from where the request has the swarm; NONE where there is nobody.
+    """Which UAV could come to each target from where the request has the swarm; NONE where none could.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ def _missing(arrays: ProblemArrays, i: int, j: int) -> float:
 
 @simulator.compiled
 def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, start: Start) -> None:
-    """Who carries what a target needs, who of them has the range, and who of those is there first."""
+    """Which UAV carries what a target needs, which of these has the range, and which of those is first."""
     for i in range(arrays.speed.shape[1]):
         for q in range(targets.shape[0]):
             j = targets[q]

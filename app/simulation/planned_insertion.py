@@ -14,6 +14,7 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.deliveries import NONE, Unloading, Visits, new_unloading, serve, visits_of
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     CHANGED,
@@ -28,7 +29,6 @@ from app.simulation.insertion import (
     exchange,
     gain,
 )
-from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve, visits_of
 from app.simulation.visit import inlined
 from app.simulation.visit_lists import connected, move_slot
 

@@ -46,7 +46,7 @@ Without reference counts (``_nrt=False``, numba's own switch for such code) a ca
 arrays costs 6 ns instead of 340. Allocate in Python or in an ordinary ``njit`` function around it.
 """
 
-compiled_free: Callable[[Function], Function] = njit(nogil=True, **_OPTIONS)
+compiled_nogil: Callable[[Function], Function] = njit(nogil=True, **_OPTIONS)
 """The same, and other threads run meanwhile: for the outermost function of long work."""
 
 
@@ -312,7 +312,6 @@ def allowed_actions(arrays: ProblemArrays, episodes: Episodes, out: Flags) -> No
             out[b, i, n] = True
 
 
-@njit(cache=True, error_model="numpy")
 def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
     """Replay B plans and compute their rewards (section 4).
 
@@ -325,8 +324,30 @@ def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
     problem
         (B,) each plan's problem in the stack.
     """
+    return _replay(arrays, plans, problem, np.empty((0, 0, 0, 0)))
+
+
+def replay_delivering(arrays: ProblemArrays, plan: Integers, delivered: Floats) -> Replay:
+    """Replay a plan of the first problem of a stack whose deliveries are given (section 3a).
+
+    Parameters
+    ----------
+    arrays
+        The stack of problems.
+    plan
+        (S, M) actions.
+    delivered
+        (S, M, K) what every visit unloads.
+    """
+    return _replay(arrays, plan[None], np.zeros(1, np.int64), delivered[None])
+
+
+@njit(cache=True, error_model="numpy")
+def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered: Floats) -> Replay:
+    """Replay plans: those of the first problem, with what every visit unloads, where that is given."""
     batch, steps, m = plans.shape
     n, k = arrays.need.shape[1], arrays.need.shape[2]
+    planned = delivered.shape[0] > 0
     result = Replay(
         np.zeros(batch), np.zeros(batch), np.zeros(batch),
         np.zeros(batch, np.int64), np.zeros(batch, np.int64), np.zeros(batch, np.int64),
@@ -347,12 +368,17 @@ def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
                 action = plans[b, s, i]
                 if action < 0 or action > n:
                     rule = NO_SUCH_ACTION
+                elif action < n and planned:
+                    rule = delivery_verdict(arrays, state, i, action, delivered[b], s)
                 elif action < n:
                     rule = verdict(arrays, state, 0, i, action)
                 if rule != ALLOWED:
                     result.step[b], result.uav[b] = s, i
                     break
-                act(arrays, state, 0, i, action)
+                if planned and action < n:
+                    deliver(arrays, state, i, action, delivered[b], s)
+                else:
+                    act(arrays, state, 0, i, action)
             s += 1
         if rule == ALLOWED:
             for i in range(m):
@@ -360,61 +386,6 @@ def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
         result.rule[b] = rule
         result.satisfaction[b], result.distance[b] = state.satisfaction[0], state.distance[0]
         result.reward[b] = state.satisfaction[0] - arrays.weight[problem[b]] * state.distance[0]
-    return result
-
-
-@njit(cache=True, error_model="numpy")
-def replay_delivering(arrays: ProblemArrays, plan: Integers, delivered: Floats) -> Replay:
-    """Replay a plan of the first problem of a stack whose deliveries are given (section 3a).
-
-    Parameters
-    ----------
-    arrays
-        The stack of problems.
-    plan
-        (S, M) actions.
-    delivered
-        (S, M, K) what every visit unloads.
-    """
-    steps, m = plan.shape
-    n, k = arrays.need.shape[1], arrays.need.shape[2]
-    state = Episodes(
-        np.zeros(1, np.int64), np.empty((1, m), np.int64), np.empty((1, m)), np.empty((1, m)),
-        np.empty((1, m), np.bool_), np.empty((1, m, k)), np.empty((1, n, k)),
-        np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.bool_),
-    )  # fmt: skip
-    reset_one(arrays, state, 0)
-    result = Replay(
-        np.zeros(1),
-        np.zeros(1),
-        np.zeros(1),
-        np.zeros(1, np.int64),
-        np.zeros(1, np.int64),
-        np.zeros(1, np.int64),
-    )
-    rule = TOO_MANY_STEPS if steps > arrays.max_steps[0] else ALLOWED
-    s = 0
-    while rule == ALLOWED and s < steps:
-        for i in range(m):
-            action = plan[s, i]
-            if action < 0 or action > n:
-                rule = NO_SUCH_ACTION
-            elif action < n:
-                rule = delivery_verdict(arrays, state, i, action, delivered, s)
-            if rule != ALLOWED:
-                result.step[0], result.uav[0] = s, i
-                break
-            if action == n:
-                act(arrays, state, 0, i, n)
-            else:
-                deliver(arrays, state, i, action, delivered, s)
-        s += 1
-    if rule == ALLOWED:
-        for i in range(m):
-            act(arrays, state, 0, i, n)
-    result.rule[0] = rule
-    result.satisfaction[0], result.distance[0] = state.satisfaction[0], state.distance[0]
-    result.reward[0] = state.satisfaction[0] - arrays.weight[0] * state.distance[0]
     return result
 
 

@@ -69,7 +69,7 @@ def unmet_targets(
     start = look_from_start(arrays, plan, open_targets)
     lookout = Lookout(arrays, plan, *scratch, hurry)
     counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
-    judge = _Judge(problem, arrays, plan, needs, start, lookout, counterfactuals)
+    judge = _Evaluator(problem, arrays, plan, needs, start, lookout, counterfactuals)
     # All of them first have a reason without looking, so that a look can end anywhere.
     found = {j: judge.at_once(j) for j in open_targets.tolist()}
     for looked, j in enumerate(urgent.tolist()):
@@ -91,7 +91,7 @@ class _Remedy(NamedTuple):
     new: bool = True
 
 
-class _Judge:
+class _Evaluator:
     """Finds the reason for one target after the other."""
 
     def __init__(

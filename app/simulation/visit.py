@@ -21,7 +21,8 @@ from app.simulation.compilation import njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-inlined: Callable[[Function], Function] = njit(inline="always", cache=True, error_model="numpy", _nrt=False)
+_INLINED: dict[str, Any] = {"inline": "always", "cache": True, "error_model": "numpy", "_nrt": False}
+inlined: Callable[[Function], Function] = njit(**_INLINED)
 """For small functions, and those with one caller: they are compiled as a part of their callers.
 
 Whatever is compiled by itself takes long where all the arrays of a plan are its arguments, and once more in

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree

@@ -7,7 +7,7 @@ from dataclasses import replace
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import (

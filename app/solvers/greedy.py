@@ -11,7 +11,7 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.simulator import (
     Episodes,
     act,
@@ -58,7 +58,7 @@ def greedy_plan(problem: Problem, stop: StopCriterion = never) -> Plan:
     problem
         The problem.
     stop
-        Asked after every few milliseconds of work; once it is true, whoever has not had their turn flies
+        Asked after every few milliseconds of work; once it is true, a UAV that has not had its turn flies
         home. So the plan is legal however early that is.
     """
     arrays = compile_problem(problem)

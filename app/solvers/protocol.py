@@ -25,7 +25,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def none_spare() -> int:
+def no_spare_threads() -> int:
     """No core is idle."""
     return 0
 
@@ -47,7 +47,7 @@ class SolverContext:
 
     library_url: str | None = None
     threads: int = 1
-    spare_threads: Callable[[], int] = none_spare
+    spare_threads: Callable[[], int] = no_spare_threads
 
 
 @dataclass(frozen=True, slots=True)

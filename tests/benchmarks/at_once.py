@@ -12,13 +12,13 @@ from numba import njit
 
 from app.learning.universal.episodes.observation import FORBIDDEN, look, look_again, new_gains, observe
 from app.learning.universal.episodes.rollout import Played
-from app.learning.universal.episodes.unfolding import Turns
+from app.learning.universal.episodes.turns import Turns
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.simulation.simulator import act, end_step, new_episodes
 
 
-def unfold_at_once(arrays, problem, plans):
-    """Like :func:`app.learning.universal.episodes.unfolding.unfold`, but for what each UAV sees."""
+def replay_turns_at_once(arrays, problem, plans):
+    """Like :func:`app.learning.universal.episodes.turns.replay_turns`, but for what each UAV sees."""
     episodes, gains = new_episodes(arrays, len(plans), problem), new_gains(arrays, len(plans))
     m, n, _ = arrays.shape
     most = plans.size
@@ -32,7 +32,7 @@ def unfold_at_once(arrays, problem, plans):
         uav=np.empty(most, np.int64),
         reward=np.zeros(plans.shape[:2]),
     )
-    count = _unfold(arrays, episodes, gains, plans, turns)
+    count = _replay_turns(arrays, episodes, gains, plans, turns)
     columns = {name: column[:count] for name, column in turns._asdict().items() if name != "reward"}
     return Turns(**columns, reward=turns.reward)
 
@@ -75,7 +75,7 @@ def play_at_once(agent, arrays, problem, rng=None):
 
 
 @njit(error_model="numpy")
-def _unfold(arrays, episodes, gains, plans, turns):
+def _replay_turns(arrays, episodes, gains, plans, turns):
     look(arrays, episodes, gains)
     count = 0
     for b in range(plans.shape[0]):

@@ -40,7 +40,7 @@ from torch.nn import functional
 
 sys.path[:0] = [str(Path(__file__).parents[2])]
 
-from at_once import play_at_once, unfold_at_once  # noqa: E402
+from at_once import play_at_once, replay_turns_at_once  # noqa: E402
 
 from app.learning.paper.architecture import QmixConfig  # noqa: E402
 from app.learning.paper.environment import SwarmEnvironment  # noqa: E402
@@ -49,7 +49,7 @@ from app.learning.paper.learner import Learner as PaperLearner  # noqa: E402
 from app.learning.paper.networks import QmixNetwork  # noqa: E402
 from app.learning.paper.replay_buffer import Batch as PaperBatch  # noqa: E402
 from app.learning.universal.episodes.rollout import play  # noqa: E402
-from app.learning.universal.episodes.unfolding import unfold  # noqa: E402
+from app.learning.universal.episodes.turns import replay_turns  # noqa: E402
 from app.learning.universal.network.agent import UniversalAgent  # noqa: E402
 from app.learning.universal.network.architecture import UniversalConfig  # noqa: E402
 from app.learning.universal.network.mixer import UniversalMixer  # noqa: E402
@@ -58,7 +58,7 @@ from app.learning.universal.training.demonstrations import demonstrate, read_sha
 from app.learning.universal.updates.learner import Learner, make_batch  # noqa: E402
 from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
 from app.simulation.arrays import ProblemArrays  # noqa: E402
-from app.simulation.explain import reward_of  # noqa: E402
+from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.greedy import greedy_plan  # noqa: E402
 
@@ -184,7 +184,7 @@ def train(name, seed, seconds, shown):
         chosen = rng.choice(LEARNED, EPISODES, replace=False)
         arrays = ProblemArrays(**{key: column[chosen] for key, column in shown.arrays._asdict().items()})
         own = not variant.demonstrations or clock.updates % OWN_EVERY == OWN_EVERY - 1
-        roll_out, replay = (play, unfold) if variant.turns else (play_at_once, unfold_at_once)
+        roll_out, replay = (play, replay_turns) if variant.turns else (play_at_once, replay_turns_at_once)
         plans = roll_out(agent, arrays, every, rng).plans if own else shown.plans[chosen]
         bootstrap = not variant.demonstrations or clock.updates % TD_EVERY == TD_EVERY - 1
         batch = make_batch(arrays, replay(arrays, every, plans), torch.device("cpu"))
@@ -275,7 +275,7 @@ def compile_at_once(tried):
     """Compile what is not kept on disk, before the clock starts."""
     few = ProblemArrays(**{key: column[:1] for key, column in tried.arrays._asdict().items()})
     play_at_once(UniversalAgent(8, 1), few, np.zeros(1, np.int64))
-    unfold_at_once(few, np.zeros(1, np.int64), tried.plans[:1])
+    replay_turns_at_once(few, np.zeros(1, np.int64), tried.plans[:1])
 
 
 def main():

@@ -22,7 +22,7 @@ from app.domain.problem import Problem  # noqa: E402
 from app.learning.auto import policy_pays  # noqa: E402
 from app.library.seeding import seed_library  # noqa: E402
 from app.simulation.arrays import compile_problem  # noqa: E402
-from app.simulation.explain import reward_of  # noqa: E402
+from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402

@@ -28,7 +28,7 @@ from problems import random_problem  # noqa: E402
 
 from app.domain.problem import Problem  # noqa: E402
 from app.domain.records import problem_to_record  # noqa: E402
-from app.simulation.explain import reward_of  # noqa: E402
+from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import generate  # noqa: E402
 from app.solvers.bound.upper_bound import gap, upper_bound  # noqa: E402
 from app.solvers.exact import Exact  # noqa: E402

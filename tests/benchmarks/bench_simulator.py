@@ -19,7 +19,7 @@ from referee import replay as slow_replay  # noqa: E402
 
 from app.domain.records import problem_to_record  # noqa: E402
 from app.simulation.arrays import compile_problem  # noqa: E402
-from app.simulation.explain import rewards_of  # noqa: E402
+from app.simulation.evaluation import rewards_of  # noqa: E402
 from app.simulation.generator import generate  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402

@@ -34,7 +34,7 @@ from app.learning.checkpoints.source_policies import SHORTLIST, SourcePolicies  
 from app.learning.parameters import TransferQmixParameters  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
 from app.library.description import task_description  # noqa: E402
-from app.simulation.explain import reward_of  # noqa: E402
+from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.stop import never  # noqa: E402

@@ -39,7 +39,7 @@ from app.learning.qmix import Qmix  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
 from app.learning.universal.training.curriculum import Shard  # noqa: E402
 from app.learning.universal.training.demonstrations import demonstrate  # noqa: E402
-from app.simulation.explain import reward_of  # noqa: E402
+from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.greedy import greedy_plan  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402

@@ -16,7 +16,7 @@ from app.domain.records import problem_to_record
 from app.library.description import task_description
 from app.library.summary import task_summary
 from app.simulation.distances import between_points
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers.greedy import greedy_plan
 
 SPELLINGS = [

@@ -15,7 +15,8 @@ from app.domain.records import problem_from_record, problem_to_record
 from app.library.summary import task_summary
 from app.settings import Settings
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import explain, reward_of
+from app.simulation.evaluation import reward_of
+from app.simulation.explain import explain
 from app.solvers.greedy import greedy_plan
 from app.solvers.unloading.solver import without_useless
 

@@ -8,7 +8,7 @@ import pytest
 
 from app.learning.auto import Auto, policy_pays
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.solver import LocalSearch

@@ -7,7 +7,7 @@ from stopping import When, at_once
 
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.learning.checkpoints.checkpoint_time import TimeForCheckpoint
+from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import Actor
 from app.learning.paper.learner import Learner
@@ -15,7 +15,7 @@ from app.learning.paper.random_streams import random_streams
 from app.learning.paper.replay_buffer import ReplayBuffer
 from app.learning.paper.trainer import Incumbent, Trainer
 from app.learning.parameters import TableParameters, TransferQmixParameters
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers.stop import never
 
 
@@ -251,11 +251,11 @@ class OneQuestion:
 
 
 def test_time_is_left_for_the_checkpoint_where_it_is_worth_it(network):
-    ample = TimeForCheckpoint(OneQuestion(10.0), network)
+    ample = CheckpointReserve(OneQuestion(10.0), network)
     needed = 10.0 - ample.seconds_left()
     # 1 to 100 MB a second.
     assert 1e-8 < needed / sum(4 * parameter.numel() for parameter in network.parameters()) < 1e-6
     assert (ample(), ample.checkpoint) == (False, True)
-    short, none = (TimeForCheckpoint(OneQuestion(s), network) for s in (2 * needed, math.inf))
+    short, none = (CheckpointReserve(OneQuestion(s), network) for s in (2 * needed, math.inf))
     assert (short.checkpoint, short.seconds_left()) == (False, 2 * needed)
     assert (none.checkpoint, none.seconds_left(), none()) == (True, math.inf, False)

@@ -9,7 +9,7 @@ from referee import replay
 
 from app.domain.records import problem_to_record
 from app.reproduction.general_optimisers import pyvrp_plan, routing_plan
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.greedy import greedy_plan
 

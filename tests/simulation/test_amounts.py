@@ -14,7 +14,8 @@ from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation import visit
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import explain, reward_of, rewards_of
+from app.simulation.evaluation import reward_of, rewards_of
+from app.simulation.explain import explain
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import new_search, set_routes
 from app.solvers.local_search.routes import DISTANCE, SATISFACTION, USELESS

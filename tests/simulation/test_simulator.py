@@ -15,7 +15,8 @@ from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation import simulator, visit
 from app.simulation.arrays import compile_problem, stack
-from app.simulation.explain import explain, reward_of, rewards_of
+from app.simulation.evaluation import reward_of, rewards_of
+from app.simulation.explain import explain
 
 RULES = {
     "returning": visit.RETURNING,

@@ -13,7 +13,7 @@ from stopping import After
 
 from app.domain.problem import Objective, Problem, Target
 from app.domain.records import problem_to_record
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.bound.instance import new_instance
 from app.solvers.bound.upper_bound import gap, upper_bound

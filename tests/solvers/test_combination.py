@@ -12,7 +12,7 @@ from referee import replay
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.column_generation.packing import Packing, next_reward, reachable
 from app.solvers.column_generation.pool import collect, new_pool, often_whole, pour, thin

@@ -15,7 +15,7 @@ from app.learning.parameters import QmixParameters
 from app.learning.universal.network.architecture import UniversalConfig
 from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import ALGORITHMS, create_solver, parse_parameters

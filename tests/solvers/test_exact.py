@@ -10,7 +10,7 @@ from problems import random_problem
 from stopping import After
 
 from app.domain.records import problem_to_record
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.exact import Exact
 from app.solvers.greedy import greedy_plan

@@ -9,7 +9,7 @@ from problems import random_problem
 from stopping import at_once
 
 from app.domain.plan import Plan
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.floor import Floor
 from app.solvers.greedy import greedy_plan

@@ -9,7 +9,7 @@ from problems import random_problem
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.records import problem_to_record
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.genetic import GeneticAlgorithm
 from app.solvers.parameters import GeneticParameters

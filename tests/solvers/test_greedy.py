@@ -6,7 +6,7 @@ from problems import random_problem
 from referee import Illegal, replay
 
 from app.domain.records import problem_to_record
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers.greedy import greedy_plan
 
 

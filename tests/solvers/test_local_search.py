@@ -14,7 +14,7 @@ from stopping import After
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of, rewards_of
+from app.simulation.evaluation import reward_of, rewards_of
 from app.simulation.generator import generate
 from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan

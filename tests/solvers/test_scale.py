@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import create_solver, parse_parameters

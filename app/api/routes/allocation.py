@@ -1,4 +1,4 @@
-"""POST /allocate: who flies where, with what."""
+"""POST /allocate: which UAV flies where, with what."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from app.learning.paper.architecture import QmixConfig
 from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import EpisodeRecord
 from app.learning.paper.networks import QmixNetwork
-from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network import architecture as universal
 from app.learning.universal.network.architecture import UniversalConfig
 from app.learning.universal.network.policy import UniversalPolicy
@@ -270,7 +270,7 @@ def _universal_values(policy: UniversalPolicy, _: UniversalConfig, problem: Prob
     plans = np.full((1, part.max_steps, part.n_uavs), part.n_targets, np.int64)
     rows = greedy_plan(part).as_array()
     plans[0, : len(rows)] = rows
-    turns = unfold(arrays, np.zeros(1, np.int64), plans)
+    turns = replay_turns(arrays, np.zeros(1, np.int64), plans)
     batch = make_batch(arrays, turns, torch.device("cpu"))
     found = evaluate(policy.agent, batch)
     chosen = found.values.gather(1, batch.action[:, None])[:, 0]

@@ -13,7 +13,7 @@ _SECONDS_A_BYTE = 3e-8
 _LARGEST_SHARE = 0.25
 
 
-class TimeForCheckpoint(Sooner):
+class CheckpointReserve(Sooner):
     """Stops before the given criterion does, by the time that a network's checkpoint takes.
 
     Where that would be a large part of the time limit, what could be learned in the rest is not worth it: the

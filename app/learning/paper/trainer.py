@@ -12,7 +12,7 @@ from app.learning.paper.learner import Learner
 from app.learning.paper.random_streams import RandomStreams
 from app.learning.paper.replay_buffer import ReplayBuffer
 from app.learning.parameters import LearningParameters
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.solvers.protocol import History, Progress, Report, StopCriterion
 from app.solvers.stop import never
 

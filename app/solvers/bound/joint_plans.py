@@ -2,7 +2,7 @@
 
 At the node's prices a plan earns at most the bound less the sum of its UAVs' slacks (README.md): so only
 routes with little slack are combined, and only as long as their slacks leave something to gain. What a plan
-earns is the simulator's word, which knows who unloads first.
+earns is evaluated by the simulator, which knows which UAV unloads first.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _PIECE = 2_000
 
 
 class JointPlans:
-    """A :class:`~app.solvers.bound.tree.Closing` for plans that unload greedily.
+    """A :class:`~app.solvers.bound.tree.CloseNode` for plans that unload greedily.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class JointPlans:
         self._instance, self._sets, self._stop = instance, sets, stop
         self._episodes = new_episodes(instance.arrays, 1)
 
-    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002 - the signature is that of `Closing`
+    def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG002 - the signature is that of `CloseNode`
         """Fly all plans of the node; None if there are too many while something is left to ask."""
         arrays, m = self._instance.arrays, len(pools.sets)
         decided = all(len(pool) + int(idle) <= 1 for pool, idle in zip(pools.sets, pools.idle, strict=True))

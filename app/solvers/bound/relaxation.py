@@ -120,7 +120,7 @@ class Relaxation:
             np.array([kept[i][r] for i, r in zip(self.master.uav, self.master.route, strict=True)])
         )
         for i, (own, pool) in enumerate(zip(self.sets, pools.sets, strict=True)):
-            # A route without deliveries for those who must fly, so that the master always has a solution.
+            # A route without deliveries for UAVs that must fly, so that the master always has a solution.
             if not pools.idle[i] and len(pool):
                 r = int(pool[np.argmin(own.cost[pool])])
                 self.master.add(i, r, -float(own.cost[r]), np.zeros(self.instance.need.shape))

@@ -1,4 +1,4 @@
-"""Branch and bound over who visits what, best bound first: the bound falls for as long as it is let.
+"""Branch and bound over which UAV visits which target, best bound first: the bound falls for as long as it is let.
 
 Children of a node say of one UAV and one target that it is on its route, or is not. What a node's prices
 show to be too far from the incumbent leaves the pools of its children.
@@ -36,7 +36,7 @@ class Node(NamedTuple):
     bound: float
 
 
-class Closing(Protocol):
+class CloseNode(Protocol):
     """Ends a node without branching, where it can."""
 
     def __call__(self, priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:
@@ -54,7 +54,7 @@ class Closing(Protocol):
         ...
 
 
-def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001 - the signature is that of `Closing`
+def whole_routes(priced: Priced, pools: Pools, visits: Floats | None, lower: float) -> float | None:  # noqa: ARG001 - the signature is that of `CloseNode`
     """Close a node in whose optimum every UAV flies one route: its value is reached by planned unloading."""
     if visits is None or _is_fractional(visits).any():
         return None
@@ -70,7 +70,7 @@ class Tree:
         The problem and the sets of targets of each UAV.
     lower
         Reward of a plan that is known, in the instance's scale.
-    closing
+    close
         How nodes end.
 
     Attributes
@@ -84,13 +84,13 @@ class Tree:
     """
 
     def __init__(
-        self, instance: Instance, sets: tuple[TargetSets, ...], lower: float, closing: Closing = whole_routes
+        self, instance: Instance, sets: tuple[TargetSets, ...], lower: float, close: CloseNode = whole_routes
     ) -> None:
         self.relaxation = Relaxation(instance, sets)
         self.lower = lower
         self.attained = True
         self.nodes = 0
-        self._closing = closing
+        self._close = close
         self._made = 0
         self._heap: list[tuple[float, int, Node]] = []
         self._push(Node(self.relaxation.all_pools(), np.zeros(instance.worth.shape), ceiling(instance)))
@@ -131,7 +131,7 @@ class Tree:
             self._push(here)
             return
         visits = None if solution is None else self._visits(solution)
-        value = self._closing(priced._replace(bound=bound), pools, visits, self.lower)
+        value = self._close(priced._replace(bound=bound), pools, visits, self.lower)
         if value is not None:
             self.lower = max(self.lower, value)
         elif stop():

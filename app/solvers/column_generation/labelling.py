@@ -1,7 +1,7 @@
 """Routes that are worth most at given prices of the targets: the pricing problem of column generation.
 
 A labelling algorithm. A label is a partial route: its last target, what it is worth, and what it has used of
-each resource that may run out (range, time to the deadlines, loads). A label is dominated by one at the same
+each resource that may run out (`resources.py`). A label is dominated by one at the same
 target that is worth as much, has used no more of anything, and may go wherever it may. "May go": visited
 targets are remembered only while the route stays near them, so that labels differ in little (the ng-route
 relaxation of Baldacci, Mingozzi and Roberti, Operations Research 59(5), 2011). A route may come back to a
@@ -16,12 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled, compiled_free
-from app.simulation.visit import limits
-from app.solvers.column_generation.packing import worth
+from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.column_generation.pool import Pool, collect
+from app.solvers.column_generation.resources import VehicleResources
 from app.solvers.local_search.routes import NONE, lay
 from app.solvers.protocol import StopCriterion
 
@@ -38,7 +36,7 @@ _MOST_MEMORY = 62
 """Bits for them."""
 
 
-class Ground(NamedTuple):
+class NgNeighbourhoods(NamedTuple):
     """What routes of all UAVs share.
 
     Attributes
@@ -58,43 +56,6 @@ class Ground(NamedTuple):
     known: Integers
     order: Integers
     place: npt.NDArray[np.int8]
-
-
-class Means(NamedTuple):
-    """What a UAV has, in R resources that may run out.
-
-    Attributes
-    ----------
-    first
-        (N, R) used after a first visit.
-    rate
-        (R,) used by a unit of distance.
-    amount
-        (N, R) used by a visit.
-    most
-        (N, R) what may have been used after a visit.
-    farthest
-        (R,) what may have been used before a visit, at whichever target.
-    start, finish
-        (N,) what it costs to begin, and to end, with a target.
-    weight
-        What a unit of distance costs.
-    visits
-        How many visits there may be.
-    nothing
-        A difference in worth that is only rounding.
-    """
-
-    first: Floats
-    rate: Floats
-    amount: Floats
-    most: Floats
-    farthest: Floats
-    start: Floats
-    finish: Floats
-    weight: float
-    visits: int
-    nothing: float
 
 
 class Labels(NamedTuple):
@@ -131,8 +92,8 @@ class Labels(NamedTuple):
     extended: Integers
 
 
-def ground_of(arrays: ProblemArrays, stop: StopCriterion) -> Ground | None:
-    """Measure the ground of the first problem of a stack; None if it was stopped."""
+def neighbourhoods_of(arrays: ProblemArrays, stop: StopCriterion) -> NgNeighbourhoods | None:
+    """Find the neighbourhoods of the first problem of a stack; None if it was stopped."""
     n = arrays.level.shape[1]
     leg = np.ascontiguousarray(arrays.between[0])
     size = min(_MEMORY, n)
@@ -149,36 +110,7 @@ def ground_of(arrays: ProblemArrays, stop: StopCriterion) -> Ground | None:
     near[:, :size] = order[:, :size]
     place = np.full((n, n), NONE, np.int8)
     place[near[:, :size], np.arange(n)[:, None]] = np.arange(size)[None, :]
-    return Ground(leg, near, np.full(n, size), order, place)
-
-
-def means_of(arrays: ProblemArrays, i: int, needed: Floats, tolerance: float = TOLERANCE) -> Means:
-    """Write down what UAV `i` has, leaving out what cannot run out; limits may be exceeded by a tolerance.
-
-    `needed` are the :func:`~app.solvers.column_generation.pool.largest_needs`.
-    """
-    speed, visits = float(arrays.speed[0, i]), min(int(arrays.max_steps[0]), arrays.level.shape[1])
-    start, home, service = arrays.start_target[0, i], arrays.home[0, i], arrays.service[0]
-    ranges, latest = limits(arrays, tolerance)
-    reach = np.broadcast_to(ranges[i], start.shape) - arrays.dis[0, i]
-    if arrays.return_to_base[0]:
-        reach = reach - home
-    rows = []
-    # Time is flown at this speed at least, so who is never late flies no farther than that.
-    if reach.min(initial=np.inf) < speed * latest.max(initial=0.0):
-        rows.append((start, 1.0, np.zeros_like(start), reach))
-    if np.isfinite(latest).any():
-        rows.append((start / speed + service, 1.0 / speed, service, latest + service))
-    for need, load, most in zip(arrays.need[0].T, arrays.load[0, i], needed, strict=True):
-        if most > load:
-            rows.append((need, 0.0, need, np.broadcast_to(load * (1.0 + tolerance), need.shape)))
-    weight, nothing = float(arrays.weight[0]), _AS_MUCH * float(worth(arrays).max(initial=0.0))
-    charged = weight if arrays.charge_return[0] else 0.0
-    columns = [np.column_stack([row[at] for row in rows] or [np.empty((len(start), 0))]) for at in (0, 2, 3)]
-    first, amount, most = (np.ascontiguousarray(column, np.float64) for column in columns)
-    rate = np.array([row[1] for row in rows], np.float64)
-    farthest = (most - amount).max(axis=0, initial=-np.inf)
-    return Means(first, rate, amount, most, farthest, weight * start, charged * home, weight, visits, nothing)
+    return NgNeighbourhoods(leg, near, np.full(n, size), order, place)
 
 
 def new_labels(targets: int, resources: int, room: int) -> Labels:
@@ -198,24 +130,33 @@ def new_labels(targets: int, resources: int, room: int) -> Labels:
     )
 
 
-@compiled_free
-def begin(ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool) -> None:
+@compiled_nogil
+def begin(
+    ng: NgNeighbourhoods, resources: VehicleResources, price: Floats, labels: Labels, exact: bool
+) -> None:
     """Begin anew, with the first visits; see :func:`extend`."""
     labels.size[0], labels.extended[0] = 0, 0
     for j in range(price.shape[0]):
         labels.first[j] = NONE
     for j in range(price.shape[0]):
         if price[j] > 0.0:
-            _visit(ground, means, price, labels, NONE, j, exact)
+            _visit(ng, resources, price, labels, NONE, j, exact)
 
 
-@compiled_free
-def extend(ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool, count: int) -> bool:
+@compiled_nogil
+def extend(
+    ng: NgNeighbourhoods,
+    resources: VehicleResources,
+    price: Floats,
+    labels: Labels,
+    exact: bool,
+    count: int,
+) -> bool:
     """Extend the next `count` labels in every way; whether there are more, and room for them.
 
     Parameters
     ----------
-    ground, means
+    ng, resources
         The problem, and what the UAV has.
     price
         (N,) what a visit is worth; none is made that is worth nothing.
@@ -230,64 +171,70 @@ def extend(ground: Ground, means: Means, price: Floats, labels: Labels, exact: b
     last = min(labels.extended[0] + count, labels.size[0])
     while labels.extended[0] < last:
         q = labels.extended[0]
-        if labels.alive[q] and labels.visits[q] < means.visits:
+        if labels.alive[q] and labels.visits[q] < resources.visits:
             i = labels.last[q]
             for nth in range(price.shape[0]):
-                j = ground.order[i, nth]
-                if _too_far(means, labels, q, ground.leg[i, j]):
+                j = ng.order[i, nth]
+                if _too_far(resources, labels, q, ng.leg[i, j]):
                     break
-                seen = ground.place[j, i]
+                seen = ng.place[j, i]
                 if price[j] <= 0.0 or (seen != NONE and labels.memory[q] >> seen & 1):
                     continue
-                if not _visit(ground, means, price, labels, q, j, exact):
+                if not _visit(ng, resources, price, labels, q, j, exact):
                     return False
         labels.extended[0] = q + 1
     return labels.extended[0] < labels.size[0]
 
 
 @compiled
-def _too_far(means: Means, labels: Labels, q: int, leg: float) -> bool:
+def _too_far(resources: VehicleResources, labels: Labels, q: int, leg: float) -> bool:
     """Whether a leg uses up so much that there is no target it may lead to."""
-    for r in range(means.rate.shape[0]):
-        if labels.used[q, r] + leg * means.rate[r] > means.farthest[r]:
+    for r in range(resources.rate.shape[0]):
+        if labels.used[q, r] + leg * resources.rate[r] > resources.farthest[r]:
             return True
     return False
 
 
 @compiled
 def _visit(
-    ground: Ground, means: Means, price: Floats, labels: Labels, parent: int, j: int, exact: bool
+    ng: NgNeighbourhoods,
+    resources: VehicleResources,
+    price: Floats,
+    labels: Labels,
+    parent: int,
+    j: int,
+    exact: bool,
 ) -> bool:
     """Extend a label by a visit, if that is possible and not dominated; False where there is no room."""
     q = labels.size[0]
     if q == labels.last.shape[0]:
         return False
-    resources = means.rate.shape[0]
+    count = resources.rate.shape[0]
     if parent == NONE:
-        for r in range(resources):
-            labels.used[q, r] = means.first[j, r]
-            if labels.used[q, r] > means.most[j, r]:
+        for r in range(count):
+            labels.used[q, r] = resources.first[j, r]
+            if labels.used[q, r] > resources.most[j, r]:
                 return True
-        labels.value[q] = price[j] - means.start[j]
+        labels.value[q] = price[j] - resources.start[j]
         labels.memory[q] = 1
         labels.visits[q] = 1
     else:
         i = labels.last[parent]
-        leg = ground.leg[i, j]
-        for r in range(resources):
-            labels.used[q, r] = labels.used[parent, r] + leg * means.rate[r] + means.amount[j, r]
-            if labels.used[q, r] > means.most[j, r]:
+        leg = ng.leg[i, j]
+        for r in range(count):
+            labels.used[q, r] = labels.used[parent, r] + leg * resources.rate[r] + resources.amount[j, r]
+            if labels.used[q, r] > resources.most[j, r]:
                 return True
-        labels.value[q] = labels.value[parent] + price[j] - means.weight * leg
+        labels.value[q] = labels.value[parent] + price[j] - resources.weight * leg
         memory = 1
-        for bit in range(ground.known[i]):
+        for bit in range(ng.known[i]):
             if labels.memory[parent] >> bit & 1:
-                kept = ground.place[ground.near[i, bit], j]
+                kept = ng.place[ng.near[i, bit], j]
                 if kept != NONE:
                     memory |= 1 << kept
         labels.memory[q] = memory
         labels.visits[q] = labels.visits[parent] + 1
-    if _dominated(means, labels, q, j, exact):
+    if _dominated(resources, labels, q, j, exact):
         return True
     labels.last[q], labels.parent[q], labels.alive[q] = j, parent, True
     labels.following[q], labels.first[j] = labels.first[j], q
@@ -296,19 +243,19 @@ def _visit(
 
 
 @compiled
-def _dominated(means: Means, labels: Labels, q: int, j: int, exact: bool) -> bool:
+def _dominated(resources: VehicleResources, labels: Labels, q: int, j: int, exact: bool) -> bool:
     """Whether a label at target `j` that is not listed yet is dominated; delists those that it dominates."""
     before, other = NONE, labels.first[j]
     # Labels come in the order of their visits, so an earlier one has no more of them.
-    free = means.visits == labels.first.shape[0]
+    free = resources.visits == labels.first.shape[0]
     while other != NONE:
         after = labels.following[other]
-        better = labels.value[other] >= labels.value[q] - means.nothing
+        better = labels.value[other] >= labels.value[q] - resources.nothing
         worse = labels.value[other] <= labels.value[q] and (free or labels.visits[other] == labels.visits[q])
         if exact:
             better = better and labels.memory[other] & ~labels.memory[q] == 0
             worse = worse and labels.memory[q] & ~labels.memory[other] == 0
-        for r in range(means.rate.shape[0]):
+        for r in range(resources.rate.shape[0]):
             better = better and labels.used[other, r] <= labels.used[q, r] * (1.0 + _AS_MUCH)
             worse = worse and labels.used[other, r] >= labels.used[q, r]
         if better:
@@ -325,14 +272,14 @@ def _dominated(means: Means, labels: Labels, q: int, j: int, exact: bool) -> boo
     return False
 
 
-def values(means: Means, labels: Labels) -> Floats:
+def values(resources: VehicleResources, labels: Labels) -> Floats:
     """Return what the labels are worth as whole routes, (size,)."""
     size = int(labels.size[0])
-    return labels.value[:size] - means.finish[labels.last[:size]]
+    return labels.value[:size] - resources.finish[labels.last[:size]]
 
 
-@compiled_free
-def remember(ground: Ground, labels: Labels, chosen: Integers) -> int:
+@compiled_nogil
+def remember(ng: NgNeighbourhoods, labels: Labels, chosen: Integers) -> int:
     """Let visits be remembered that some labels forgot and made twice; return how many more there are.
 
     Between the two visits every target remembers the first one, as far as there are bits.
@@ -348,16 +295,19 @@ def remember(ground: Ground, labels: Labels, chosen: Integers) -> int:
                 between, j = labels.parent[later], labels.last[later]
                 while between != earlier:
                     i = labels.last[between]
-                    if ground.place[j, i] == NONE and ground.known[i] < ground.near.shape[1]:
-                        ground.near[i, ground.known[i]], ground.place[j, i] = j, ground.known[i]
-                        ground.known[i] += 1
+                    if ng.place[j, i] == NONE and ng.known[i] < ng.near.shape[1]:
+                        ng.near[i, ng.known[i]], ng.place[j, i] = (
+                            j,
+                            ng.known[i],
+                        )
+                        ng.known[i] += 1
                         more += 1
                     between = labels.parent[between]
             later = labels.parent[later]
     return more
 
 
-@compiled_free
+@compiled_nogil
 def collect_labels(
     arrays: ProblemArrays,
     pool: Pool,

@@ -9,20 +9,19 @@ import numpy as np
 from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.solvers.column_generation.labelling import (
-    Ground,
     Labels,
-    Means,
+    NgNeighbourhoods,
     begin,
     collect_labels,
     extend,
-    ground_of,
-    means_of,
+    neighbourhoods_of,
     new_labels,
     remember,
     values,
 )
 from app.solvers.column_generation.packing import Packing, Relaxation, idle_cost, worth
 from app.solvers.column_generation.pool import Pool, largest_needs
+from app.solvers.column_generation.resources import VehicleResources, resources_of
 from app.solvers.protocol import StopCriterion
 
 _ROOM = 40_000
@@ -81,8 +80,8 @@ class Pricing:
             the bound; routes that need it are not added.
         """
         self._arrays, self._pool, self._room, self._tolerance = arrays, pool, room, tolerance
-        self._ground: Ground | None = None
-        self._kinds: list[tuple[int, int, Means]] = []
+        self._neighbourhoods: NgNeighbourhoods | None = None
+        self._kinds: list[tuple[int, int, VehicleResources]] = []
         self._labels: dict[int, Labels] = {}
         steps = int(arrays.max_steps[0])
         self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
@@ -92,24 +91,24 @@ class Pricing:
         self.bound = np.inf
         """What no choice of whole routes exceeds, whether they are in the pool or not."""
 
-    def _prepare(self, ended: StopCriterion) -> Ground | None:
+    def _prepare(self, ended: StopCriterion) -> NgNeighbourhoods | None:
         """Measure what the labels need, once; None if there was no time."""
-        if self._ground is not None:
-            return self._ground
+        if self._neighbourhoods is not None:
+            return self._neighbourhoods
         arrays = self._arrays
-        ground = ground_of(arrays, ended)
-        if ground is None:
+        ng = neighbourhoods_of(arrays, ended)
+        if ng is None:
             return None
         needed, prepared = largest_needs(arrays), []
         kinds, number = np.unique(self._pool.kind[~arrays.ret[0]], return_counts=True)
         for i, many in zip(kinds.tolist(), number.tolist(), strict=True):
             if ended():
                 return None
-            prepared.append((i, many, means_of(arrays, i, needed, self._tolerance)))
-        resources = {len(means.rate) for _, _, means in prepared}
-        self._labels = {size: new_labels(arrays.shape[1], size, self._room) for size in resources}
-        self._kinds, self._ground = prepared, ground
-        return ground
+            prepared.append((i, many, resources_of(arrays, i, needed, self._tolerance)))
+        counts = {len(resources.rate) for _, _, resources in prepared}
+        self._labels = {size: new_labels(arrays.shape[1], size, self._room) for size in counts}
+        self._kinds, self._neighbourhoods = prepared, ng
+        return ng
 
     def close(
         self, packing: Packing, best: float, ended: StopCriterion, thorough: bool = True
@@ -132,14 +131,14 @@ class Pricing:
         Relaxation or None
             None where HiGHS finds no optimum in time, or there is no time to begin.
         """
-        ground = self._prepare(ended)
-        if ground is None:
+        ng = self._prepare(ended)
+        if ng is None:
             return None
         exact, effort = False, 0
         relaxed = packing.relax()
         while relaxed is not None and effort < self._effort and not ended():
             promised = max(0.0, relaxed.reward - packing.better_than(best))
-            turn = self._ask(ground, packing, relaxed, promised, exact, ended)
+            turn = self._ask(ng, packing, relaxed, promised, exact, ended)
             effort += turn.labels
             if turn.grew:
                 relaxed, exact = packing.relax(), False
@@ -153,7 +152,7 @@ class Pricing:
 
     def _ask(
         self,
-        ground: Ground,
+        ng: NgNeighbourhoods,
         packing: Packing,
         relaxed: Relaxation,
         promised: float,
@@ -164,13 +163,13 @@ class Pricing:
         made, grew, remembered, complete = 0, False, False, exact and not packing.fixed
         spare = packing.spare()
         bound = float(np.maximum(0.0, self._worth - relaxed.price).sum())
-        for asked, (i, many, means) in enumerate(self._kinds, start=1):
+        for asked, (i, many, resources) in enumerate(self._kinds, start=1):
             if not spare[i]:
                 continue
-            labels = self._labels[len(means.rate)]
-            complete &= self._label(ground, means, relaxed.price, labels, exact, ended)
+            labels = self._labels[len(resources.rate)]
+            complete &= self._label(ng, resources, relaxed.price, labels, exact, ended)
             made += int(labels.size[0])
-            value, least = values(means, labels), relaxed.least[i]
+            value, least = values(resources, labels), relaxed.least[i]
             bound += many * max(value.max(initial=-np.inf), -self._idle[i])
             before = self._known()
             good = _most(value, least - promised, _BATCH)
@@ -179,7 +178,7 @@ class Pricing:
                 grew = True
             elif exact:
                 cycles = _most(value, least + self._gain, _CYCLES)
-                remembered |= remember(ground, labels, cycles) > 0
+                remembered |= remember(ng, labels, cycles) > 0
             if ended():
                 # The others come first next time.
                 self._kinds = self._kinds[asked:] + self._kinds[:asked]
@@ -189,12 +188,18 @@ class Pricing:
         return _Turn(made, grew, remembered)
 
     def _label(
-        self, ground: Ground, means: Means, price: Floats, labels: Labels, exact: bool, ended: StopCriterion
+        self,
+        ng: NgNeighbourhoods,
+        resources: VehicleResources,
+        price: Floats,
+        labels: Labels,
+        exact: bool,
+        ended: StopCriterion,
     ) -> bool:
         """Make the labels of a UAV; whether they are all there are."""
-        begin(ground, means, price, labels, exact)
+        begin(ng, resources, price, labels, exact)
         while labels.extended[0] < labels.size[0]:
-            if ended() or not extend(ground, means, price, labels, exact, _PIECE):
+            if ended() or not extend(ng, resources, price, labels, exact, _PIECE):
                 break
         return bool(labels.extended[0] == labels.size[0])
 

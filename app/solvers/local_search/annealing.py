@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled, compiled_free
+from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.column_generation.pool import Pool, collect, new_pool
 from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (
@@ -168,7 +168,7 @@ def drop_useless(search: Search) -> None:
     keep_best(search)
 
 
-@compiled_free
+@compiled_nogil
 def anneal(
     search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float,
     haste: float = 0.0, thrift: float = 0.0, collecting: bool = False,

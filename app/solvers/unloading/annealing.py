@@ -13,8 +13,8 @@ import numpy as np
 
 from app.domain.plan import Actions
 from app.simulation.arrays import Floats, ProblemArrays
-from app.simulation.simulator import compiled, compiled_free
-from app.simulation.unloading import NONE, Unloading, Visits, new_unloading, serve
+from app.simulation.deliveries import NONE, Unloading, Visits, new_unloading, serve
+from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
 from app.solvers.local_search.change import Change, apply, extra_distance, feasible, undo
 from app.solvers.local_search.moves import draw_move
@@ -87,7 +87,7 @@ def keep_if_best(planned: PlannedSearch) -> None:
                 search.best_target[i, s] = routes.target[i, s]
 
 
-@compiled_free
+@compiled_nogil
 def anneal_planned(
     planned: PlannedSearch, rng: np.random.Generator, hot: float, cold: float, moves: int, work: float
 ) -> int:

@@ -10,8 +10,8 @@ import numpy as np
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.deliveries import best_deliveries
 from app.simulation.simulator import replay_delivering
-from app.simulation.unloading import best_deliveries
 from app.simulation.visit import ALLOWED
 from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of

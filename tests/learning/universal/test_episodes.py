@@ -10,7 +10,7 @@ from stopping import After
 from app.domain.records import problem_to_record
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.rollout import play
-from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES
 from app.learning.universal.request.fine_tuning import FineTuning
 from app.learning.universal.updates.learner import evaluate, make_batch
@@ -37,7 +37,7 @@ def test_greedy_actions_are_those_of_the_unfolded_episode(make_policy):
         problem = random_problem(rng)
         policy, arrays = make_policy(number % 5), compile_problem(problem)
         plans = play(policy.agent, arrays, np.zeros(1, np.int64)).plans
-        turns = unfold(arrays, np.zeros(1, np.int64), plans)
+        turns = replay_turns(arrays, np.zeros(1, np.int64), plans)
         if not len(turns.action):
             continue
         with torch.inference_mode():
@@ -78,7 +78,7 @@ def test_rewards_of_the_steps_add_up(make_policy):
         problem = random_problem(rng)
         arrays = compile_problem(problem)
         played = play(make_policy(number % 5).agent, arrays, np.zeros(2, np.int64), rng)
-        turns = unfold(arrays, np.zeros(2, np.int64), played.plans)
+        turns = replay_turns(arrays, np.zeros(2, np.int64), played.plans)
         charged = replay(problem_to_record(problem), [[problem.n_targets] * problem.n_uavs])["reward"]
         # An episode in which nobody may fly has no step in which the way home could be charged.
         expected = played.rewards if len(turns.action) else played.rewards - charged
@@ -91,7 +91,7 @@ def test_observations_are_bounded_and_finite():
         problem = random_problem(rng)
         arrays = compile_problem(problem)
         plans = np.full((1, problem.max_steps, problem.n_uavs), problem.n_targets)
-        turns = unfold(arrays, np.zeros(1, np.int64), plans)
+        turns = replay_turns(arrays, np.zeros(1, np.int64), plans)
         assert turns.pair.shape[2] == PAIR_FEATURES
         assert turns.own.shape[1] == OWN_FEATURES
         for rows in (turns.pair, turns.own, turns.rivals):

@@ -8,7 +8,7 @@ import torch
 from stopping import After
 
 from app.learning.universal.episodes.rollout import play
-from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.training.curriculum import Shard
 from app.learning.universal.training.demonstrations import demonstrate
 from app.learning.universal.updates.learner import Learner, evaluate, joint_values, lambda_returns, make_batch
@@ -24,7 +24,7 @@ def shown():
 
 @pytest.fixture(scope="module")
 def batch(shown):
-    turns = unfold(shown.arrays, np.arange(len(shown.rewards)), shown.plans)
+    turns = replay_turns(shown.arrays, np.arange(len(shown.rewards)), shown.plans)
     return make_batch(shown.arrays, turns, torch.device("cpu"))
 
 

@@ -11,7 +11,7 @@ from app.learning.universal.episodes.rollout import play
 from app.learning.universal.request import recombination
 from app.learning.universal.request.recombination import Recombination
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.stop import never
 

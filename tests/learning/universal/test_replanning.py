@@ -11,7 +11,7 @@ from app.domain.records import problem_to_record
 from app.learning.universal.episodes.rollout import play
 from app.learning.universal.request.replanning import groups_of, replan, residual_of, round_of
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.greedy import greedy_plan
 

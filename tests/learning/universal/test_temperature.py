@@ -7,7 +7,7 @@ import pytest
 
 from app.learning.universal.episodes.temperature import Temperature
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 

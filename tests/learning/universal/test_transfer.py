@@ -24,7 +24,7 @@ from app.learning.universal.request.transfer import fill_in
 from app.library.entries import new_policy
 from app.library.summary import task_summary
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import SolverContext

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.simulation.arrays import Integers, ProblemArrays
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 from app.simulation.visit import ALLOWED
 from app.solvers.local_search.annealing import ROUNDING
 

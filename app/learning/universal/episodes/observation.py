@@ -1,7 +1,7 @@
 """What a UAV sees at its turn, whatever the size of the problem: one row a target, and one of its own.
 
-Every number is a ratio: distances over the extent, rewards over the largest level, times over the time it
-takes a UAV of mean speed to cross the extent, amounts over other amounts. So nothing depends on units, and
+Every number is a ratio: distances over the span, rewards over the largest level, times over the time it
+takes a UAV of mean speed to cross the span, amounts over other amounts. So nothing depends on units, and
 nothing depends on how UAVs, targets or materials are numbered, but for the order in which UAVs act.
 
 What a UAV must know of the others to fill its rows: where they are, what they carry, how far they can still
@@ -47,7 +47,7 @@ class VisitGains(NamedTuple):
 
     Attributes
     ----------
-    extent, level, time
+    span, level, time
         (P,) scales of each problem: distances, rewards, times.
     near
         (P, N, L) the targets nearest to each target.
@@ -59,7 +59,7 @@ class VisitGains(NamedTuple):
         (M,) scratch: the best and the second best of each UAV's visits.
     """
 
-    extent: Floats
+    span: Floats
     level: Floats
     time: Floats
     near: Integers
@@ -72,12 +72,12 @@ class VisitGains(NamedTuple):
 def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
     """Return what distances, rewards and times are divided by, (P,) each; never 0."""
     far = np.maximum(arrays.start_target.max(axis=(1, 2)), arrays.between.max(axis=(1, 2)))
-    extent = np.maximum(np.maximum(far, arrays.home.max(axis=(1, 2))), arrays.start_home.max(axis=1))
-    extent = np.where(extent > 0, extent, 1.0)
+    span = np.maximum(np.maximum(far, arrays.home.max(axis=(1, 2))), arrays.start_home.max(axis=1))
+    span = np.where(span > 0, span, 1.0)
     level = np.where(arrays.need_total > 0, arrays.level, 0.0).max(axis=1)
     flying = ~arrays.ret
     speed = np.where(flying, arrays.speed, 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
-    return extent, np.where(level > 0, level, 1.0), extent / np.where(speed > 0, speed, 1.0)
+    return span, np.where(level > 0, level, 1.0), span / np.where(speed > 0, speed, 1.0)
 
 
 def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
@@ -91,13 +91,13 @@ def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
         B.
     """
     m, n, _ = arrays.shape
-    extent, level, time = scales(arrays)
+    span, level, time = scales(arrays)
     length = max(1, min(FOLLOW_UPS, n - 1))
     between = np.where(arrays.need_total[:, None, :] > 0, arrays.between, np.inf)
     between[:, np.arange(n), np.arange(n)] = np.inf
     near = np.argsort(between, axis=2, kind="stable")[:, :, :length]
     return VisitGains(
-        extent=extent,
+        span=span,
         level=level,
         time=time,
         near=np.ascontiguousarray(near, dtype=np.int64),
@@ -184,7 +184,7 @@ def observe(
     """
     p = episodes.problem[b]
     m, n = episodes.at.shape[1], episodes.need.shape[1]
-    scale, extent, time = gains.level[p], gains.extent[p], gains.time[p]
+    scale, span, time = gains.level[p], gains.span[p], gains.time[p]
     steps_left = arrays.max_steps[p] - episodes.step[b]
     load = 0.0
     for k in range(episodes.load.shape[2]):
@@ -224,7 +224,7 @@ def observe(
             seen[2] = squash((other_net - max(its_elsewhere, 0.0)) / scale)
             seen[3] = gains.unloaded[b, other, j] / need
             seen[4] = 1.0 if other > i else 0.0
-            seen[5] = leg_to(arrays, episodes, b, other, j) / extent
+            seen[5] = leg_to(arrays, episodes, b, other, j) / span
             supply += gains.unloaded[b, other, j]
             if other_net > best:
                 best, second, rival = other_net, best, other
@@ -240,7 +240,7 @@ def observe(
 
         row = pair[j]
         row[0] = 1.0 if allowed else 0.0
-        row[1] = d / extent
+        row[1] = d / span
         row[2] = squash(cost / scale)
         row[3] = value / scale
         row[4] = squash(net / scale) if allowed else -1.0
@@ -248,9 +248,9 @@ def observe(
         row[6] = unloaded / load if load > 0.0 else 0.0
         row[7] = need / arrays.need_total[p, j] if arrays.need_total[p, j] > 0.0 else 0.0
         row[8] = min(arrays.level[p, j] / scale, LARGEST_LEVEL)
-        row[9] = clip((arrays.voyage[p, i] - reach) / extent, -1.0, 3.0)
-        row[10] = home_then / extent
-        row[11] = (d + home_then - home_now) / extent
+        row[9] = clip((arrays.voyage[p, i] - reach) / span, -1.0, 3.0)
+        row[10] = home_then / span
+        row[11] = (d + home_then - home_now) / span
         row[12] = 1.0 if deadline < np.inf else 0.0
         row[13] = (
             clip((deadline - episodes.clock[b, i] - travel) / time, -2.0, 4.0) if deadline < np.inf else 0.0
@@ -285,7 +285,7 @@ def _observe_self(
     """Write what does not belong to one target; entries 0 to 2 are the caller's."""
     p = episodes.problem[b]
     m, n, materials = episodes.at.shape[1], episodes.need.shape[1], episodes.load.shape[2]
-    scale, extent, time = gains.level[p], gains.extent[p], gains.time[p]
+    scale, span, time = gains.level[p], gains.span[p], gains.time[p]
     steps = arrays.max_steps[p]
     steps_left = steps - episodes.step[b]
     load = start_load = most = swarm = 0.0
@@ -315,8 +315,8 @@ def _observe_self(
     left = arrays.voyage[p, i] - episodes.flown[b, i]
     own[3] = load / most if most > 0.0 else 0.0
     own[4] = load / start_load if start_load > 0.0 else 0.0
-    own[5] = clip(left / extent, 0.0, 4.0)
-    own[6] = home_now / extent
+    own[5] = clip(left / span, 0.0, 4.0)
+    own[6] = home_now / span
     own[7] = squash(arrays.weight[p] * home_now / scale) if arrays.charge_return[p] else 0.0
     own[8] = 1.0 if arrays.charge_return[p] else 0.0
     own[9] = 1.0 if arrays.return_to_base[p] else 0.0
@@ -324,11 +324,11 @@ def _observe_self(
     own[11] = 1.0 / steps_left
     own[12] = 1.0 if steps_left == 1 else 0.0
     own[13] = clip(episodes.clock[b, i] / time, 0.0, 4.0)
-    own[14] = clip(arrays.speed[p, i] * time / extent, 0.0, 4.0)
+    own[14] = clip(arrays.speed[p, i] * time / span, 0.0, 4.0)
     own[15] = m / (m + n)
     own[16] = covered / needed if needed > 0.0 else 0.0
     own[17] = covered / swarm if swarm > 0.0 else 0.0
-    own[18] = squash(arrays.weight[p] * extent / scale)
+    own[18] = squash(arrays.weight[p] * span / scale)
     own[19] = out / m
     own[20] = (i + 0.5) / m
     own[21] = 1.0 / n

@@ -24,7 +24,7 @@ from app.learning.universal.network.inference import ask_together, attention_bia
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, end_step, new_episodes
-from app.solvers.protocol import StopCriterion, none_spare
+from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
 
@@ -55,12 +55,12 @@ def play(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
-    spare: Callable[[], int] = none_spare,
+    spare: Callable[[], int] = no_spare_threads,
     epsilon: Floats | None = None,
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
 
-    The network is not asked where "return" is all that is allowed: whoever returns has no later turn, so what
+    The network is not asked where "return" is all that is allowed: a UAV that returns has no later turn, so what
     it would remember of this one does not matter.
 
     Parameters
@@ -74,7 +74,7 @@ def play(
     temperature
         Of the sampling; less is greedier.
     stop
-        Asked before every turn; once it is true, everybody who is still out flies home.
+        Asked before every turn; once it is true, every UAV that is still out flies home.
     spare
         Asked at every turn how many threads more it may use then.
     epsilon
@@ -88,7 +88,7 @@ def play(
     plans = np.full((batch, steps, m), n, np.int64)
     rewards = np.zeros(batch)
     compiled, sharpness = compile_agent(agent), float(agent.sharpness.detach().exp())
-    bias = attention_bias(agent, (arrays.between / gains.extent[:, None, None]).astype(np.float32))
+    bias = attention_bias(agent, (arrays.between / gains.span[:, None, None]).astype(np.float32))
     hidden = np.zeros((m, batch, len(compiled.home)), np.float32)
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
@@ -150,7 +150,7 @@ def play_in_orders(
     rng: np.random.Generator | None = None,
     temperature: float = 1.0,
     stop: StopCriterion = never,
-    spare: Callable[[], int] = none_spare,
+    spare: Callable[[], int] = no_spare_threads,
 ) -> Integers:
     """Play one problem with its UAVs taking turns in several orders; return plans (Q * repeats, S, M).
 

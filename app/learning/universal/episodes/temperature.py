@@ -7,7 +7,7 @@ a temperature that rises while episodes repeat what is known, and falls while th
 from __future__ import annotations
 
 from app.simulation.arrays import Integers, ProblemArrays
-from app.simulation.explain import rewards_of
+from app.simulation.evaluation import rewards_of
 
 _REPEATED = 0.2
 """Share of episodes as good as the best plan above which it gets warmer; with none of them it cools."""

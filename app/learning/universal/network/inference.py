@@ -267,7 +267,7 @@ def _pool(rival_in: Affine, rivals: Float32s, pooled: Float32s) -> None:
         f0, f1, f2 = rivals[other, 0], rivals[other, 1], rivals[other, 2]
         f3, f4, f5 = rivals[other, 3], rivals[other, 4], rivals[other, 5]
         if f0 == _ZERO:
-            # Who may not go there adds nothing.
+            # A UAV that may not go there adds nothing.
             for c in range(half):
                 most[c] = max(most[c], _ZERO)
             continue

@@ -104,7 +104,7 @@ class UniversalOnBoard(nn.Module):
         pair, own, rivals
             (T, N, 30), (T, 22) and (T, N, M, 6) observations.
         distances
-            (N, N) between targets, over the mission's extent.
+            (N, N) between targets, over the mission's span.
         hidden
             (T, W) recurrent states of the UAVs' turns before; zeros at first.
 

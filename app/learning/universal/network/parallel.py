@@ -33,7 +33,7 @@ def in_parallel(work: Callable[[Item], Result], items: Sequence[Item], spare: in
     work
         What is done with each. It must not wait for other work that is done in parallel.
     items
-        With none of them left out, unless whoever iterates stops: then those that have not begun.
+        With none of them left out, unless the caller stops iterating: then those that have not begun.
     spare
         Cores that are idle.
     """

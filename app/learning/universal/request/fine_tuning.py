@@ -12,12 +12,12 @@ from app.domain.errors import ProblemTooLarge
 from app.learning.compute.device import learning_device
 from app.learning.universal.episodes.effort import batch_of, episodes_of
 from app.learning.universal.episodes.rollout import exploration, play
-from app.learning.universal.episodes.unfolding import unfold
+from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.updates.learner import Learner, make_batch
 from app.learning.universal.updates.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays, stack
-from app.solvers.protocol import StopCriterion, none_spare
+from app.solvers.protocol import StopCriterion, no_spare_threads
 
 TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
@@ -76,7 +76,7 @@ class FineTuning:
         lr: float,
         gamma: float,
         rng: np.random.Generator,
-        spare: Callable[[], int] = none_spare,
+        spare: Callable[[], int] = no_spare_threads,
     ) -> None:
         self._device = learning_device()
         self.policy = copy.deepcopy(policy).to(self._device)
@@ -136,7 +136,7 @@ class FineTuning:
         if stop() or expected > stop.seconds_left():
             return
         problem = np.zeros(len(plans), np.int64)
-        turns = unfold(self._arrays, problem, plans)
+        turns = replay_turns(self._arrays, problem, plans)
         stacked = stack([self._arrays] * len(plans))
         batch = make_batch(stacked, turns, self._device)
         if self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate, stop=stop):

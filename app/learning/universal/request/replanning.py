@@ -20,7 +20,7 @@ from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, new_episodes, reset_one, verdict
 from app.simulation.visit import ALLOWED, START, cost_of, earned_by, leg
-from app.solvers.protocol import StopCriterion, none_spare
+from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
 _FEWEST, _MOST = 2, 6
@@ -136,7 +136,7 @@ def replan(
     episodes: int,
     rng: np.random.Generator,
     stop: StopCriterion = never,
-    spare: Callable[[], int] = none_spare,
+    spare: Callable[[], int] = no_spare_threads,
 ) -> Integers:
     """Let a policy plan groups of UAVs anew, eight times each, all from the same plan.
 

@@ -31,7 +31,7 @@ from app.learning.universal.request.replanning import replan, round_of
 from app.simulation.arrays import Integers, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
-from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, none_spare
+from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, no_spare_threads
 from app.solvers.seeds import seed_sequence
 
 _TRIED_AT_SIGHT = 2
@@ -78,7 +78,7 @@ class UniversalTransfer:
         seed: int,
         stop: StopCriterion,
         report: Report,
-        spare: Callable[[], int] = none_spare,
+        spare: Callable[[], int] = no_spare_threads,
     ) -> None:
         self._spare = spare
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
@@ -148,7 +148,7 @@ class UniversalTransfer:
 
         # Where policies are played side by side, there is no core left for the turns of one of them.
         spare = self._spare()
-        within = self._spare if len(tried) == 1 else none_spare
+        within = self._spare if len(tried) == 1 else no_spare_threads
         for source, plans in zip(tried, in_parallel(play_from, tried, spare), strict=False):
             found.append((source, self._best.consider(plans)))
             if not self._used.is_bare:
@@ -249,7 +249,7 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     polished = parameters.polish is not False
     moves = default.polish_moves if parameters.polish_moves is None else parameters.polish_moves
     moves = moves if polished else 0
-    # Who asks for samples alone asks for them quickly.
+    # A request for samples alone is a request for a quick answer.
     replans = REPLANS_A_SAMPLE * samples if n_epochs or moves else 0
     replans = replans if parameters.replans is None else parameters.replans
     filled = parameters.in_service().model_copy(

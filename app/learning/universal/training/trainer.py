@@ -22,7 +22,7 @@ from safetensors.torch import load_file, save_file
 from app.learning.compute.device import learning_device
 from app.learning.universal.episodes.rollout import play
 from app.learning.universal.episodes.turn_order import draw_orders, reorder, reorder_plans
-from app.learning.universal.episodes.unfolding import of_uavs, unfold
+from app.learning.universal.episodes.turns import of_uavs, replay_turns
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.mixer import UniversalMixer
 from app.learning.universal.training.demonstrations import Demonstrations, read_shard
@@ -155,7 +155,7 @@ def _demonstrated(
     chosen = rng.choice(len(shown.rewards), count, replace=False)
     arrays = ProblemArrays(**{name: column[chosen] for name, column in shown.arrays._asdict().items()})
     arrays, plans = _in_random_order(arrays, shown.plans[chosen], rng)
-    turns = unfold(arrays, np.arange(count), plans)
+    turns = replay_turns(arrays, np.arange(count), plans)
     share = TURN_TOKENS / (len(turns.action) * n)
     whole = share > MIN_SHARE
     if not whole:
@@ -182,7 +182,7 @@ def _own(
 ) -> Batch:
     problems = np.arange(len(arrays.max_steps))
     played = play(agent, arrays, problems, rng)
-    return make_batch(arrays, unfold(arrays, problems, played.plans), device)
+    return make_batch(arrays, replay_turns(arrays, problems, played.plans), device)
 
 
 def _optimisers(learner: Learner) -> list[torch.optim.Optimizer]:

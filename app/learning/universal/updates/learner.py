@@ -17,7 +17,7 @@ from torch.nn import functional
 
 from app.learning.parameters import SERVICE_GRAD_NORM_CLIP
 from app.learning.universal.episodes.observation import scales
-from app.learning.universal.episodes.unfolding import Turns
+from app.learning.universal.episodes.turns import Turns
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.mixer import UniversalMixer
 from app.learning.universal.updates.optimiser import MakeOptimisers, adam
@@ -59,9 +59,9 @@ class Batch(NamedTuple):
 
 def make_batch(arrays: ProblemArrays, turns: Turns, device: torch.device) -> Batch:
     """Turn unfolded episodes, one of each problem of a stack in order, into tensors."""
-    extent, level, _ = scales(arrays)
+    span, level, _ = scales(arrays)
     m = arrays.shape[0]
-    distance = (arrays.between / extent[:, None, None]).astype(np.float32)
+    distance = (arrays.between / span[:, None, None]).astype(np.float32)
     reward = (turns.reward / level[:, None] / m).astype(np.float32)
     columns = {**turns._asdict(), "distance": distance, "reward": reward}
     tensors = {name: torch.from_numpy(column).to(device) for name, column in columns.items()}

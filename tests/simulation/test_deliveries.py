@@ -13,9 +13,10 @@ from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import explain, reward_of
+from app.simulation.deliveries import best_deliveries
+from app.simulation.evaluation import reward_of
+from app.simulation.explain import explain
 from app.simulation.generator import generate
-from app.simulation.unloading import best_deliveries
 
 
 def worth(problem, delivered, actions):

@@ -45,7 +45,7 @@ class Turns(NamedTuple):
     reward: Floats
 
 
-def unfold(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
+def replay_turns(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
     """Replay legal plans and write down every turn.
 
     Parameters
@@ -69,7 +69,7 @@ def unfold(arrays: ProblemArrays, problem: Integers, plans: Integers) -> Turns:
         uav=np.empty(most, np.int64),
         reward=np.zeros(plans.shape[:2]),
     )
-    count = _unfold(arrays, episodes, gains, plans, turns)
+    count = _replay_turns(arrays, episodes, gains, plans, turns)
     columns = {name: column[:count] for name, column in turns._asdict().items() if name != "reward"}
     return Turns(**columns, reward=turns.reward)
 
@@ -82,7 +82,7 @@ def of_uavs(turns: Turns, uavs: Integers) -> Turns:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _unfold(
+def _replay_turns(
     arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, plans: Integers, turns: Turns
 ) -> int:
     look(arrays, episodes, gains)

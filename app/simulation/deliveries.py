@@ -2,7 +2,7 @@
 
 For given routes the best amounts solve a linear program, which falls apart by material into transportation
 problems: UAVs supply what they carry, targets demand what they need, visits connect them, and a unit is worth
-``level / need_total`` of the target that gets it. As its worth does not depend on who brings it, the demands
+``level / need_total`` of the target that gets it. As its worth does not depend on which UAV brings it, the demands
 that can be met together form a polymatroid, on which the greedy rule is exact: serve the targets in the order
 of their worth, each as far as is possible without taking from those before it. "As far as possible" is found
 by augmenting paths: a UAV that has nothing left takes over from another at a target both visit, and so on.
@@ -24,7 +24,7 @@ NONE = -1
 
 
 class Visits(NamedTuple):
-    """Who visits whom. Visit number s of UAV i is ``slot = s * M + i``.
+    """Which UAV visits which target. Visit number s of UAV i is ``slot = s * M + i``.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ def _search(arrays: ProblemArrays, visits: Visits, unloading: Unloading, j: int,
     search, serving = unloading.number[0], unloading.number[1]
     tail, head, at, gives = 0, 0, j, NONE
     while True:
-        # Everyone who visits `at` could take over what `gives` unloads there, or serve `j` itself.
+        # Every UAV that visits `at` could take over what `gives` unloads there, or serve `j` itself.
         if unloading.seen_target[at] != search:
             unloading.seen_target[at] = search
             slot = visits.first[at]

@@ -16,7 +16,7 @@ from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
 from app.learning.universal.episodes.rollout import play
 from app.simulation.arrays import compile_problem
-from app.simulation.explain import reward_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import SolverContext

@@ -31,7 +31,7 @@ def fits(arrays: ProblemArrays) -> bool:
     return m * int(arrays.max_steps[0]) * (n + 1) <= TURN_TOKENS
 
 
-class UniversalScratch:
+class UniversalFromScratch:
     """Learns one problem.
 
     Parameters
