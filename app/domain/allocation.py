@@ -1,4 +1,4 @@
-"""The answer to a problem: a plan with what it earns, which UAV flies where with what, and what stays unmet."""
+"""The answer to a problem: a plan with what it earns, its routes, and what stays unmet."""
 
 from __future__ import annotations
 

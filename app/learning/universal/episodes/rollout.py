@@ -60,8 +60,8 @@ def play(
 ) -> Played:
     """Play one episode of each listed problem, all in lock-step, UAV after UAV.
 
-    The network is not asked where "return" is all that is allowed: a UAV that returns has no later turn, so what
-    it would remember of this one does not matter.
+    The network is not asked where "return" is all that is allowed: a UAV that returns has no later turn,
+    so what it would remember of this one does not matter.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The order in which UAVs take their turns: a symmetry of the problem that the policy does not have.
 
-The UAV that acts first commits first, so the same policy flies another plan when the same UAVs are numbered in
-another order. Roll-outs in several orders are several chances; a demonstration holds in every order.
+The UAV that acts first commits first, so the same policy flies another plan when the same UAVs are numbered
+in another order. Roll-outs in several orders are several chances; a demonstration holds in every order.
 """
 
 from __future__ import annotations
