@@ -2,7 +2,7 @@
 
 For given routes the best amounts solve a linear program, which falls apart by material into transportation
 problems: UAVs supply what they carry, targets demand what they need, visits connect them, and a unit is worth
-``level / need_total`` of the target that gets it. Its worth is the same whichever UAV brings it, so the demands
+``level / need_total`` of the target that gets it. Which UAV brings it does not matter, so the demands
 that can be met together form a polymatroid, on which the greedy rule is exact: serve the targets in the order
 of their worth, each as far as is possible without taking from those before it. "As far as possible" is found
 by augmenting paths: a UAV that has nothing left takes over from another at a target both visit, and so on.

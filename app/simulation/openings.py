@@ -1,4 +1,4 @@
-"""What an area with needs left could still get: UAVs that could come, and where one more visit fits into a plan.
+"""What an area with needs left could still get: UAVs that could come, and places for a visit in a plan.
 
 Facts only; :mod:`app.simulation.unmet` says what follows from them. Every place in the route of every UAV is
 looked at, and what a visit there does is exact, not guessed.

@@ -1,4 +1,4 @@
-"""Branch and bound over visits of UAVs to targets, best bound first: the bound falls for as long as it is let.
+"""Branch and bound over visits of UAVs to targets, best bound first: the bound falls as long as it runs.
 
 Children of a node say of one UAV and one target that it is on its route, or is not. What a node's prices
 show to be too far from the incumbent leaves the pools of its children.
