@@ -1,4 +1,4 @@
-# `make run` starts the service, `make test` passes every check; both do the whole set-up first.
+# `make run` starts the service, `make test` passes every check; each first installs what it needs, into one place.
 PORT ?= 8000
 HOST ?= 127.0.0.1
 PYTHON ?= python3
@@ -8,28 +8,29 @@ PROCESSES ?= 2
 
 .PHONY: run test lint types borders unit bench constraints clean
 
-run: .venv/compiled
+# Workers compile at the first start what is not compiled yet, beside the first answers.
+run: .venv/service
 	$(BIN)/python -m app serve --host $(HOST) --port $(PORT)
 
 # What looks at the code, beside what compiles it.
-test: .venv/installed
+test: .venv/development
 	$(MAKE) --jobs 2 --output-sync=line lint types borders .venv/compiled
 	$(MAKE) unit
 
-lint: .venv/installed
+lint: .venv/development
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: .venv/installed
+types: .venv/development
 	$(BIN)/mypy
 
-borders: .venv/installed
+borders: .venv/development
 	$(BIN)/lint-imports
 
 unit: .venv/compiled
 	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder
 
-bench: .venv/installed
+bench: .venv/development
 	$(BIN)/python tests/benchmarks/bench_simulator.py
 	$(BIN)/python tests/benchmarks/bench_training.py
 	$(BIN)/python tests/benchmarks/bench_local_search.py
@@ -48,15 +49,23 @@ constraints:
 	.venv-constraints/bin/pip freeze --exclude uav-allocator --exclude pip --exclude setuptools | sed 's/+cpu$$//' > constraints.txt
 	rm -rf .venv-constraints
 
-# On all cores; pip would do that on one. What is left out is large, and nobody needs it, or one file of it.
-.venv/installed: pyproject.toml constraints.txt
+# Bytecode is left to the first start, which writes a quarter of what there could be.
+INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable
+
+.venv/service: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[dev]"
-	$(BIN)/python -m compileall -qq -j 0 -x '/(pymavlink/dialects|tests)/' .venv/lib || true
+	$(INSTALL) ".[client]"
 	touch $@
 
+# Bytecode on all cores; pip would do that on one. What is left out is large, and nobody needs it, or one file of it.
+.venv/development: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(INSTALL) ".[dev]"
+	$(BIN)/python -m compileall -qq -j 0 -x '/(pymavlink/dialects|tests)/' .venv/lib || true
+	touch .venv/service $@
+
 # Once for all, so that several workers that start at once do not all do it.
-.venv/compiled: .venv/installed $(shell find app -name '*.py')
+.venv/compiled: .venv/development $(shell find app -name '*.py')
 	$(BIN)/python -m app compile
 	touch $@
 

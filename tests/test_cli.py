@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import httpx
@@ -46,6 +48,15 @@ def known(tmp_path):
             database.dispose()
 
     return read
+
+
+def test_the_command_that_is_installed_is_the_same_command_line():
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    assert list(scripts) == ["uav-allocator"]
+    installed = EntryPoint("uav-allocator", scripts["uav-allocator"], "console_scripts").load()
+    shown = CliRunner().invoke(installed, ["serve", "--help"])
+    assert shown.exit_code == 0
+    assert "Start the service" in shown.stdout
 
 
 def test_experiments_that_are_not_done_go_on_with_the_same_command(tmp_path):

@@ -87,8 +87,15 @@ def test_the_readme_is_short():
 
 def test_the_version_to_cite_is_this_one():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [project["version"]] == [app.__version__]
+    assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [app.__version__]
+
+
+def test_the_version_of_the_package_is_this_one():
+    """It stands in one place, which the package's metadata follow."""
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in declared["project"]
+    assert declared["project"]["dynamic"] == ["version"]
+    assert declared["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "app.__version__"}
 
 
 def test_every_type_of_error_is_in_the_guide():

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from multiprocessing.connection import wait
 from typing import Any
 
 import numpy as np
@@ -22,7 +25,7 @@ from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
 from app.simulation.arrays import compile_problem
-from app.simulation.compilation import write_in_turns
+from app.simulation.compilation import compile_in_turns, compiled_here, first_at
 from app.simulation.generator import generate
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
@@ -50,6 +53,9 @@ _TRIED = {
 largest, and where there is much of the one and little of the other."""
 
 _ANSWERS_TIMED = 3
+
+_COMPILING_LEAVES = 5
+"""Niceness of what compiles while jobs may run: as much as the workers have."""
 
 _PARAMETERS: dict[str, dict[str, Any]] = {
     "greedy": {},
@@ -80,18 +86,92 @@ def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | Non
     library_url
         Database with the source policies that jobs will ask for.
     """
-    write_in_turns()
-    for part in _PARTS.values():
-        part()
+    compile_in_turns()
+    _prepare_default(most_uavs, most_targets, library_url)
+    _prepare_others(most_uavs, most_targets, library_url)
+
+
+def warm_up_worker(
+    most_uavs: int = 50, most_targets: int = 100, library_url: str | None = None
+) -> threading.Thread | None:
+    """Do the same, but where code has to be compiled, wait only for what the default algorithm needs.
+
+    The others' code is then compiled by another process, and a thread loads it after that: a request that
+    needs some of it earlier waits for that, and for nothing else.
+
+    Returns
+    -------
+    threading.Thread or None
+        What still goes on, if anything does.
+    """
+    compile_in_turns()
+    _prepare_default(most_uavs, most_targets, library_url)
+    if not compiled_here():
+        _prepare_others(most_uavs, most_targets, library_url)
+        return None
+    arguments = most_uavs, most_targets, library_url
+    later = threading.Thread(target=_prepare_others_later, args=arguments, name="warm-up", daemon=True)
+    later.start()
+    return later
+
+
+def _prepare_default(most_uavs: int, most_targets: int, library_url: str | None) -> None:
+    _load(_DEFAULT)
     if library_url is not None:
         resolve(_PRELOAD)(library_url, _small_problem())
     _time_answers(most_uavs, most_targets)
-    means = protocol.SolverContext(library_url)
-    for algorithm, sizes in _TRIED.items():
-        for m, n in sizes:
-            _time_preparations(algorithm, _large_problem(min(most_uavs, m), min(most_targets, n)), means)
+    _time_algorithms(["transfer_qmix"], most_uavs, most_targets, library_url)
 
+
+def _prepare_others(most_uavs: int, most_targets: int, library_url: str | None) -> None:
+    _load(_OTHERS)
+    others = [algorithm for algorithm in _TRIED if algorithm != "transfer_qmix"]
+    _time_algorithms(others, most_uavs, most_targets, library_url)
     _time_bound(_large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1])))
+
+
+def _prepare_others_later(most_uavs: int, most_targets: int, library_url: str | None) -> None:
+    compiling = multiprocessing.get_context("spawn").Process(target=_compile_others)
+    compiling.start()
+    compiling.join()
+    _prepare_others(most_uavs, most_targets, library_url)
+
+
+def _compile_others() -> None:
+    """Compile in a process of its own, which ends with its worker."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.nice(_COMPILING_LEAVES)
+    compile_in_turns()
+    _load(_OTHERS)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _load(parts: Sequence[str]) -> None:
+    """Load what parts need, those last that another process is at: it may be compiling."""
+    put_off = []
+    for part in parts:
+        with first_at(part) as first:
+            if first:
+                _PARTS[part]()
+            else:
+                put_off.append(part)
+    for part in put_off:
+        _PARTS[part]()
+
+
+def _time_algorithms(
+    algorithms: Sequence[str], most_uavs: int, most_targets: int, library_url: str | None
+) -> None:
+    means = protocol.SolverContext(library_url)
+    for algorithm in algorithms:
+        for m, n in _TRIED[algorithm]:
+            _time_preparations(algorithm, _large_problem(min(most_uavs, m), min(most_targets, n)), means)
 
 
 def _time_bound(problem: Problem) -> None:
@@ -144,11 +224,9 @@ def compile_all(processes: int) -> None:
     processes
         How many, at least 1.
     """
-    first, *others = _PARTS
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=write_in_turns) as pool:
-        pool.submit(_do, first).result()
-        list(pool.map(_do, others))
+    with ProcessPoolExecutor(processes, mp_context=context, initializer=compile_in_turns) as pool:
+        list(pool.map(_do, (*_DEFAULT, *_OTHERS)))
     warm_up()
 
 
@@ -191,7 +269,7 @@ def _geography() -> None:
 
 def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
     """Load and compile what :func:`app.allocation.tasks.allocate_at_once` needs; see :func:`warm_up`."""
-    write_in_turns()
+    compile_in_turns()
     request = _request(_small_problem(), "greedy", {})
     tasks.allocate_at_once({**request, "bound_time_limit_s": 1.0}, _unlimited())
     _unloading()
@@ -256,4 +334,10 @@ _PARTS: dict[str, Callable[[], None]] = {
     "bound": _bound,
     "geography": _geography,
 }
-"""What together loads and compiles all there is: first what the others need too, then what takes longest."""
+"""What together loads and compiles all there is."""
+
+_DEFAULT = ("transfer", "local_search", "greedy", "planned unloading", "geography")
+"""Parts that an answer of the default algorithm needs: what takes longest first, then what is
+a part of it and is compiled beside it."""
+
+_OTHERS = tuple(part for part in _PARTS if part not in _DEFAULT)

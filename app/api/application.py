@@ -55,7 +55,8 @@ _READ_HEADERS = (
     "X-Request-ID",
 )
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
-_WARM_UP, _WARM_UP_RESERVE = "app.allocation.warm_up:warm_up", "app.allocation.warm_up:warm_up_at_once"
+_WARM_UP = "app.allocation.warm_up:warm_up_worker"
+_WARM_UP_RESERVE = "app.allocation.warm_up:warm_up_at_once"
 _REQUEST_THREADS = 8
 _SEARCHES_LEAVE = 5
 """Niceness of the workers: a third of a core's time where somebody else has something to do on it."""

@@ -7,26 +7,30 @@ this program that it imports, directly or not: an edit or an update of any of th
 depend on it, and nothing else.
 
 Numba reads a function's index, adds an entry and writes it back: of two processes that do so at once, one
-loses its entry, or both give their code the same name. Workers that start together do;
-:func:`write_in_turns` keeps them apart.
+loses its entry, or both give their code the same name. Workers that start together do, and would compile
+everything once each; :func:`compile_in_turns` keeps them apart.
 """
 
 from __future__ import annotations
 
 import fcntl
+import gc
 import hashlib
 import os
 import re
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
 from numba import config, njit
-from numba.core import caching
+from numba.core import caching, sigutils
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
 
-__all__ = ["njit", "source_stamp", "stamped_files", "write_in_turns"]
+__all__ = ["compile_in_turns", "compiled_here", "first_at", "njit", "source_stamp", "stamped_files"]
 
 _ROOT = Path(__file__).resolve().parents[2]
 """Folder that holds the package `app`."""
@@ -122,17 +126,87 @@ config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined]  # numba 
 )
 
 
-def write_in_turns() -> None:
-    """Make this process wait, whenever it keeps compiled code, while another of the same user does so."""
-    save = caching.IndexDataCacheFile.save
-    if hasattr(save, "__wrapped__"):
+def compile_in_turns() -> None:
+    """Make this process wait, whenever it needs a function, while another of the same user compiles it.
+
+    After that it finds the function's code kept. Processes that need the same functions so share the work.
+    A function is compiled while its callers are, so locks are taken in the order of calls, in which there are
+    no circles: no two processes wait for each other.
+    """
+    alone = Dispatcher.compile
+    if hasattr(alone, "__wrapped__"):
         return
 
-    @wraps(save)
-    def in_turn(self: caching.IndexDataCacheFile, key: Any, data: Any) -> None:
-        # The lock of a process that is killed is free at once.
-        with _LOCK.open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            save(self, key, data)  # type: ignore[no-untyped-call]  # untyped in numba
+    @wraps(alone)
+    def in_turn(self: Any, sig: Any) -> Any:
+        args, _ = sigutils.normalize_signature(sig)  # type: ignore[no-untyped-call]  # untyped in numba
+        if tuple(args) in self.overloads or isinstance(self._cache, caching.NullCache):
+            return alone(self, sig)
+        # A file's lock is the process's: its threads take turns at numba's own lock.
+        with global_compiler_lock, _turn(self._cache._cache_file._index_path), _few_collections():
+            misses = self._cache_misses.total()
+            entry = alone(self, sig)
+            _compiled_here[0] += self._cache_misses.total() - misses
+            return entry
 
-    caching.IndexDataCacheFile.save = in_turn  # type: ignore[method-assign]  # numba has no hook for it
+    Dispatcher.compile = in_turn  # type: ignore[method-assign]  # numba has no hook for it
+
+
+def compiled_here() -> int:
+    """Return how many functions this process has compiled since :func:`compile_in_turns`, not found kept."""
+    return _compiled_here[0]
+
+
+_compiled_here = [0]
+
+
+@contextmanager
+def _few_collections() -> Iterator[None]:
+    """Compile without looking for garbage all the time: a fifth of the time, as most objects are kept."""
+    before = gc.get_threshold()
+    gc.set_threshold(_ALLOCATIONS, *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
+_ALLOCATIONS = 200_000
+"""How many more objects there are before the youngest are looked through."""
+
+
+@contextmanager
+def first_at(work: str) -> Iterator[bool]:
+    """Say whether no other process of this user is at a piece of work; meanwhile this one is."""
+    byte = _byte(f"{_ROOT}\0{work}")
+    try:
+        fcntl.lockf(_lock_file(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+    except OSError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        fcntl.lockf(_lock_file(), fcntl.LOCK_UN, 1, byte)
+
+
+@contextmanager
+def _turn(name: str) -> Iterator[None]:
+    """Hold the lock of a name, which one process of this user has at a time; a killed one has none."""
+    byte = _byte(name)
+    fcntl.lockf(_lock_file(), fcntl.LOCK_EX, 1, byte)
+    try:
+        yield
+    finally:
+        fcntl.lockf(_lock_file(), fcntl.LOCK_UN, 1, byte)
+
+
+def _byte(name: str) -> int:
+    """Return which byte of the file is locked for a name; there need be none."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:6], "big")
+
+
+@cache
+def _lock_file() -> int:
+    # Never closed: with that a process gives back all its locks of the file.
+    return os.open(_LOCK, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o600)

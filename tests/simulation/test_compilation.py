@@ -1,4 +1,4 @@
-"""Processes that compile the same functions at the same time lose nothing and mix nothing up."""
+"""Processes that compile the same functions share the work, lose nothing and mix nothing up."""
 
 import importlib
 import inspect
@@ -10,7 +10,7 @@ from pathlib import Path
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
-from app.simulation.compilation import source_stamp, stamped_files
+from app.simulation.compilation import first_at, source_stamp, stamped_files
 
 MODULE = """
 from numba import njit
@@ -24,12 +24,12 @@ PROGRAM = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from app.simulation.compilation import write_in_turns
+from app.simulation.compilation import compile_in_turns, compiled_here
 from doubling import double
 
 number, start = int(sys.argv[1]), Path(sys.argv[2])
-write_in_turns()
-write_in_turns()
+compile_in_turns()
+compile_in_turns()
 kinds = [np.int8, np.int16, np.int32, np.int64, np.uint8, np.uint16, np.uint32, np.float32]
 while number and not start.exists():
     time.sleep(0.001)
@@ -39,6 +39,8 @@ for kind in kinds[number % 4:] + kinds[: number % 4]:
 if not number:
     assert not double.stats.cache_misses, double.stats
     assert sum(double.stats.cache_hits.values()) == 16, double.stats
+assert compiled_here() == sum(double.stats.cache_misses.values())
+print(compiled_here())
 """
 
 
@@ -46,13 +48,41 @@ def test_several_writers_of_one_cache(tmp_path):
     (tmp_path / "doubling.py").write_text(MODULE)
     start = tmp_path / "start"
     command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{PROGRAM}"]
-    writers = [subprocess.Popen([*command, str(number), str(start)]) for number in (1, 2, 3, 4)]
+    writers = [
+        subprocess.Popen([*command, str(number), str(start)], stdout=subprocess.PIPE)
+        for number in (1, 2, 3, 4)
+    ]
     start.touch()
-    assert [writer.wait(timeout=120) for writer in writers] == [0] * 4
+    compiled = [int(writer.communicate(timeout=120)[0]) for writer in writers]
+    assert [writer.returncode for writer in writers] == [0] * 4
+    assert sum(compiled) == 16
     subprocess.run([*command, "0", str(start)], check=True, timeout=120)
 
 
 ROOT = Path(__file__).parents[2]
+
+AT_WORK = """
+import sys
+from app.simulation.compilation import first_at
+
+with first_at("sorting") as first:
+    print(first, flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_one_process_at_a_time_is_first_at_a_piece_of_work():
+    pipe = subprocess.PIPE
+    other = subprocess.Popen([sys.executable, "-c", AT_WORK], stdin=pipe, stdout=pipe, text=True, cwd=ROOT)
+    assert other.stdout.readline() == "True\n"
+    with first_at("sorting") as first:
+        assert not first
+    with first_at("counting") as first:
+        assert first
+    other.communicate("\n", timeout=60)
+    with first_at("sorting") as first:
+        assert first
+
 
 WHO_VISITS = """
 import numpy as np
