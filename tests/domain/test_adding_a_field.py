@@ -41,6 +41,8 @@ from app.api.body_validation import BodyValidator
 from app.api.errors import InvalidBody
 from app.api.json_body import read_body
 from app.api.problem_models import to_problem
+from app.api.plan_formats.flown_plan import flown_plan
+from app.api.plan_formats.geojson import geojson
 from app.domain import reference
 from app.domain.errors import InvalidProblem
 from app.domain.problem import Problem, Target
@@ -66,6 +68,9 @@ def refused(problem, **fields):
 plain = taken()
 full = taken(access=0.25, earliest=3, covered=True, ground="sand", full_load=[7.0], **json.loads(sys.argv[2]))
 record = problem_to_record(full)
+stays = {"uav_id": full.uavs[0].id, "distance": 0.0, "return_distance": 0.0, "stops": []}
+plan = {"job_id": "1", "algorithm": "greedy", "reward": 0.0, "satisfaction": 0.0, "distance": 0.0,
+        "routes": [stays], "unmet": []}
 older = problem_to_record(full)
 del older["targets"][0]["access"]
 print(json.dumps({
@@ -81,6 +86,7 @@ print(json.dumps({
         refused(full, skills=("a", "b\\n")), refused(full, called="\\t"),
         refused(full, kept={"a": 5000 * "b"}),
     ],
+    "exported": json.loads(geojson(flown_plan(full, plan)))["features"],
     "reference": reference.table_of(Target),
 }))
 """
@@ -172,6 +178,12 @@ def test_the_description_of_the_service_has_it(found):
 def test_the_reference_has_it(found):
     assert "| `access` | How easily it is reached |  | 0 to 1 | `0.5` |" in found["reference"]
     assert "| `earliest` | A visit begins no sooner | time units, or h |  | `null` |" in found["reference"]
+
+
+def test_the_plan_as_geojson_has_it(found):
+    uav, area = (feature["properties"] for feature in found["exported"])
+    assert uav["full_load"] == [7.0]
+    assert {name: area[name] for name in SET} == SET
 
 
 def test_the_pages_files_have_it(found):
