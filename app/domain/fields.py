@@ -2,7 +2,8 @@
 
 A field of :mod:`app.domain.problem` is declared as ``Annotated[type, kind, "sentence"]``, and nowhere else.
 Its check, its record, its place in a request, its column in files and its row in the reference follow from
-that. This module has the kinds there are; :mod:`app.domain.field_checks` applies them to whole problems.
+that. This module has the kinds there are, :mod:`app.domain.text_fields` those of texts, and
+:mod:`app.domain.field_checks` applies them to whole problems.
 """
 
 from __future__ import annotations
