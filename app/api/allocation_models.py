@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.problem_models import ProblemModel, Whole, WireModel
+from app.api.problem_models import ProblemModel
+from app.api.wire_fields import Whole, WireModel
 from app.domain.allocation import UnmetCode
 from app.domain.warnings import CODES as WARNING_CODES
 from app.solvers.registry import ALGORITHMS

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 
 from app.api.allocation_models import Allocation, AllocationRequest, AnswerModel
 from app.api.errors import BatchTooLarge
-from app.api.problem_models import Identifier, WireModel
+from app.api.wire_fields import Identifier, WireModel
 from app.domain.identifiers import fault_of
 from app.settings import Settings
 

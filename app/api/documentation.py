@@ -17,7 +17,11 @@ from starlette.staticfiles import StaticFiles
 from app.api.access.guard import SCHEME, document, needed_role
 from app.api.batch_models import BatchLine
 from app.api.problem_details import ProblemDetails, responses
+from app.api.problem_models import largest
 from app.api.security_headers import content_policy
+from app.api.wire_fields import wire_model
+from app.domain.fields import Amounts, Items, declared_fields
+from app.domain.problem import Problem
 from app.settings import Settings
 
 DESCRIPTION = """\
@@ -43,13 +47,17 @@ _INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 def _name_limits(components: dict[str, Any], settings: Settings) -> None:
     """Say in the schemas how large a problem may be here, which is the operator's to set."""
-    for name in ("ProblemModel", "AllocationRequest"):
-        components[name]["properties"]["uavs"]["maxItems"] = settings.max_uavs
-        components[name]["properties"]["targets"]["maxItems"] = settings.max_targets
-    for name in ("UAVModel", "TargetModel"):
-        components[name]["properties"]["loadlist"]["maxItems"] = settings.max_materials
-    requested, _null = components["TargetModel"]["properties"]["requested"]["anyOf"]
-    requested["maxItems"] = settings.max_materials
+    for each in declared_fields(Problem):
+        if not isinstance(each.kind, Items):
+            continue
+        for name in ("ProblemModel", "AllocationRequest"):
+            components[name]["properties"][each.name]["maxItems"] = largest(each.name, settings)
+        properties = components[wire_model(each.kind.of).__name__]["properties"]
+        for inner in declared_fields(each.kind.of):
+            if isinstance(inner.kind, Amounts):
+                # One that may be left open is a list or null.
+                amounts = properties[inner.name]
+                amounts.get("anyOf", [amounts])[0]["maxItems"] = settings.max_materials
 
 
 def operation_id(route: APIRoute) -> str:

@@ -14,7 +14,7 @@ from app.api.access.guard import client
 from app.api.errors import JobCancelled, JobFailed
 from app.api.job_models import job_response, result_of, written_result_of
 from app.api.preferences import Preferences
-from app.api.problem_models import WireModel
+from app.api.wire_fields import WireModel
 from app.jobs.errors import Draining
 from app.jobs.model import Idempotency, Job, JobStatus
 from app.jobs.stored_json import StoredJson, write

@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.api.allocation_models import AnswerModel, TrainingModel
-from app.api.problem_models import ProblemModel, Whole, WireModel
+from app.api.problem_models import ProblemModel
+from app.api.wire_fields import Whole, WireModel
 from policy_store.policy import Neighbour, Policy, PolicyPage
 
 JOB_ID_PATTERN = "^[0-9a-f]{32}$"

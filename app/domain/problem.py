@@ -6,33 +6,37 @@ problem, and :class:`~app.domain.errors.InvalidProblem` lists every rule that wa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import Annotated, Literal, get_args
 
-import numpy as np
-
-from app.domain.errors import InvalidProblem, Violation
+from app.domain.errors import InvalidProblem
+from app.domain.field_checks import Look, look_at, violations_of, without_tiny
+from app.domain.fields import MAX_MAGNITUDE as MAX_MAGNITUDE  # noqa: PLC0414 - limits of a problem, exported from here
+from app.domain.fields import (
+    MIN_MAGNITUDE,
+    Amounts,
+    Choice,
+    Context,
+    Coordinate,
+    Flag,
+    Identifier,
+    Items,
+    Number,
+    Part,
+    Whole,
+    declared_fields,
+    written,
+)
 from app.domain.geometry import distance, longitude_stretch
-from app.domain.identifiers import fault_of
+from app.domain.units import DISTANCE, SPEED, TIME, X, Y
 
 Crs = Literal["local", "wgs84"]
 Unloading = Literal["greedy", "planned"]
 
 MAX_STEPS = 100
 """Largest number of decision steps a problem may ask for."""
-
-MAX_MAGNITUDE = 1e12
-"""Largest absolute value of any number of a problem: keeps every sum and product of the simulator finite."""
-
-MIN_MAGNITUDE = 1e-100
-"""Smallest absolute value of a number that is not 0: smaller ones are taken as 0.
-
-Products of three such numbers, and quotients of them and ``MAX_MAGNITUDE``, are still ordinary numbers. A
-speed, which must not be 0, is refused below it.
-"""
 
 TOLERANCE = 1e-6
 """Relative tolerance of the comparisons with range and deadline."""
@@ -43,77 +47,58 @@ ROUNDING = 1e-9
 _SAME_PLACE_KM = 1e-9
 """Extent on the globe below which all positions are one place."""
 
-_Item = TypeVar("_Item")
-
 
 @dataclass(frozen=True, slots=True)
 class UAV:
-    """One UAV (Eq. 7).
+    """One UAV (Eq. 7 of the paper)."""
 
-    Attributes
-    ----------
-    id
-        Unique in the swarm.
-    x_s, y_s
-        Starting point, where it returns to.
-    x_c, y_c
-        Current position.
-    speed
-        Average speed, distance units per time unit, > 0.
-    voyage
-        Maximum range of one flight, in distance units.
-    dis
-        Distance already flown.
-    ret
-        True when it is returning and gets no more tasks.
-    loadlist
-        Amounts carried, one a material, K of them.
-    """
-
-    id: str
-    x_s: float
-    y_s: float
-    x_c: float
-    y_c: float
-    speed: float
-    voyage: float
-    loadlist: tuple[float, ...]
-    dis: float = 0.0
-    ret: bool = False
+    id: Annotated[
+        str,
+        Identifier(stem="uav"),
+        "Unique in the swarm; default: uav-1, uav-2, … by place in the list",
+    ]
+    x_s: Annotated[float, Coordinate(axis=X), f"Starting point, where it returns to: {X}"]
+    y_s: Annotated[float, Coordinate(axis=Y), f"Starting point: {Y}"]
+    x_c: Annotated[float, Coordinate(axis=X, same_as="x_s"), "Current position; default: the starting point"]
+    y_c: Annotated[float, Coordinate(axis=Y, same_as="y_s"), "Current position; default: the starting point"]
+    speed: Annotated[float, Number(low=MIN_MAGNITUDE, unit=SPEED), f"Average speed: {SPEED}"]
+    voyage: Annotated[float, Number(low=0.0, unit=DISTANCE), f"Maximum range of one flight, in {DISTANCE}"]
+    dis: Annotated[float, Number(low=0.0, unit=DISTANCE), "Distance already flown"] = field(
+        default=0.0, kw_only=True
+    )
+    ret: Annotated[bool, Flag(digit=True), "1 when it is returning: it gets no more tasks"] = field(
+        default=False, kw_only=True
+    )
+    loadlist: Annotated[tuple[float, ...], Amounts(), "Amounts carried, one a material"]
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One rescue area (Eq. 9), with the time window of the paper's future work.
+    """One rescue area (Eq. 9 of the paper).
 
-    Attributes
-    ----------
-    id
-        Unique among the targets.
-    x, y
-        Position.
-    level
-        Emergency level; larger is more urgent.
-    loadlist
-        Amounts still needed, one a material, K of them.
-    deadline
-        Latest arrival in time units from now, or None.
-    service_time
-        Time spent unloading at a visit.
-    requested
-        Amounts that it asked for at first, K of them, none below its ``loadlist``; None stands for that. What
-        a visit earns is by shares of these, so an area that is nearly served is not as urgent as one that has
-        nothing.
+    It has the time window of the paper's future work.
     """
 
-    id: str
-    x: float
-    y: float
-    level: float
-    loadlist: tuple[float, ...]
-    deadline: float | None = None
-    service_time: float = 0.0
-    requested: tuple[float, ...] | None = None
+    id: Annotated[
+        str,
+        Identifier(stem="area"),
+        "Unique among the targets; default: area-1, area-2, … by place in the list",
+    ]
+    x: Annotated[float, Coordinate(axis=X), f"Position: {X}"]
+    y: Annotated[float, Coordinate(axis=Y), f"Position: {Y}"]
+    level: Annotated[float, Number(low=0.0), "Emergency level; larger is more urgent"]
+    loadlist: Annotated[tuple[float, ...], Amounts(), "Amounts still needed, one a material"]
+    deadline: Annotated[
+        float | None, Number(unit=TIME), f"Latest arrival, in {TIME.local} from now; default: none"
+    ] = None
+    service_time: Annotated[float, Number(low=0.0, unit=TIME), "Time spent unloading at a visit"] = 0.0
+    requested: Annotated[
+        tuple[float, ...] | None,
+        Amounts(same_as="loadlist"),
+        "Amounts that it asked for at first, one a material, none below its `loadlist`; what a visit earns "
+        "is by shares of these, so an area that has nearly all is not as urgent as one that has nothing. "
+        "Default: its `loadlist`",
+    ] = None
 
     @property
     def need(self) -> tuple[float, ...]:
@@ -132,33 +117,42 @@ class Target:
             return self.level
         return self.level * (sum(self.need) / sum(self.requested))
 
+    def broken_rules(self) -> Iterator[tuple[str, str]]:
+        """Yield the amounts of ``requested`` that are less than what is still needed."""
+        if self.requested is None:
+            return
+        for k, (asked, needed) in enumerate(zip(self.requested, self.loadlist, strict=False)):
+            if asked < needed * (1.0 - ROUNDING):
+                yield (
+                    f"/requested/{k}",
+                    f"{written(asked)} is less than the {written(needed)} still needed",
+                )
+
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """What a plan is paid for.
+    """What a plan is paid for."""
 
-    Attributes
-    ----------
-    distance_weight
-        λ, reward lost per unit of distance; None stands for 1 / extent, 1 is Eq. 14 to the letter.
-    return_to_base
-        A visit is allowed only if the UAV can still fly home.
-    charge_return
-        The leg home costs reward too.
-    unloading
-        ``"greedy"``: a visit unloads all that is needed and carried, the paper's rule. ``"planned"``: how
-        much it unloads is decided with the plan.
-    """
-
-    distance_weight: float | None = None
-    return_to_base: bool = True
-    charge_return: bool = False
-    unloading: Unloading = "greedy"
+    distance_weight: Annotated[
+        float | None,
+        Number(low=0.0),
+        "λ, reward lost per unit of distance; 1 is Eq. (14) to the letter; null: 1 / extent",
+    ] = None
+    return_to_base: Annotated[bool, Flag(), "A visit is allowed only if the UAV can still fly home"] = True
+    charge_return: Annotated[bool, Flag(), "The leg home costs reward too"] = False
+    unloading: Annotated[
+        Unloading,
+        Choice(get_args(Unloading)),
+        "greedy: a visit unloads all that is needed and carried, the paper's rule. planned: how much it "
+        "unloads is decided with the plan, so that a UAV can keep material for a more urgent area",
+    ] = "greedy"
 
 
 @dataclass(frozen=True)
 class Problem:
-    """M UAVs, N targets, K materials and at most S decision steps.
+    """A swarm, rescue areas, and what a plan is paid for.
+
+    M UAVs, N targets, K materials and at most S decision steps.
 
     Raises
     ------
@@ -166,20 +160,34 @@ class Problem:
         With a violation for every broken rule; pointers are relative to the problem.
     """
 
-    uavs: tuple[UAV, ...]
-    targets: tuple[Target, ...]
-    max_steps: int = 5
-    crs: Crs = "local"
-    objective: Objective = field(default_factory=Objective)
+    uavs: Annotated[tuple[UAV, ...], Items(UAV, called="UAVs", least=1), "The swarm"]
+    targets: Annotated[tuple[Target, ...], Items(Target, called="targets", least=1), "The rescue areas"]
+    max_steps: Annotated[int, Whole(1, MAX_STEPS), "Most decision steps of a plan, S"] = 5
+    crs: Annotated[
+        Crs,
+        Choice(get_args(Crs)),
+        "local: x, y on a plane, Euclidean distances. wgs84: x longitude and y latitude in degrees, great "
+        f"circles in {DISTANCE.wgs84}, speeds in {SPEED.wgs84}, times in {TIME.wgs84}",
+    ] = "local"
+    objective: Annotated[Objective, Part(Objective), "What a plan is paid for"] = field(
+        default_factory=Objective
+    )
 
     def __post_init__(self) -> None:
-        violations = list(_violations(self))
-        if violations:
-            raise InvalidProblem.of(violations)
-        if _has_tiny(self):
-            object.__setattr__(self, "uavs", tuple(_without_tiny(uav) for uav in self.uavs))
-            object.__setattr__(self, "targets", tuple(_without_tiny(target) for target in self.targets))
-            object.__setattr__(self, "objective", _without_tiny(self.objective))
+        context = Context(self.crs, len(self.uavs[0].loadlist) if self.uavs else None)
+        found = look_at([self], Problem, context)
+        if found is Look.WRONG:
+            violations = list(violations_of(self, "", context))
+            if violations:
+                raise InvalidProblem.of(violations)
+        if found is not Look.SOUND:
+            for each in declared_fields(Problem):
+                object.__setattr__(self, each.name, without_tiny(getattr(self, each.name)))
+
+    def broken_rules(self) -> Iterator[tuple[str, str]]:
+        """Yield that there are no materials; how many there are, the first UAV says."""
+        if self.uavs and not self.uavs[0].loadlist:
+            yield "/uavs/0/loadlist", "0 materials; at least 1 is needed"
 
     @property
     def n_uavs(self) -> int:
@@ -215,184 +223,3 @@ class Problem:
         """λ as it is used: the objective's, or 1 / extent."""
         given = self.objective.distance_weight
         return 1.0 / self.extent if given is None else given
-
-
-def _violations(problem: Problem) -> Iterator[Violation]:
-    if not problem.uavs:
-        yield Violation("/uavs", "0 UAVs; at least 1 is needed")
-    if not problem.targets:
-        yield Violation("/targets", "0 targets; at least 1 is needed")
-    if not 1 <= problem.max_steps <= MAX_STEPS:
-        yield Violation("/max_steps", f"{problem.max_steps} is not in 1..{MAX_STEPS}")
-    if problem.crs not in ("local", "wgs84"):
-        yield Violation("/crs", f"{problem.crs!r} is neither 'local' nor 'wgs84'")
-    if problem.objective.unloading not in ("greedy", "planned"):
-        yield Violation(
-            "/objective/unloading", f"{problem.objective.unloading!r} is neither 'greedy' nor 'planned'"
-        )
-    weight = problem.objective.distance_weight
-    if weight is not None:
-        yield from _number("/objective/distance_weight", weight, low=0.0)
-    materials = len(problem.uavs[0].loadlist) if problem.uavs else None
-    if materials == 0:
-        yield Violation("/uavs/0/loadlist", "0 materials; at least 1 is needed")
-    yield from _uav_violations(problem, materials)
-    yield from _target_violations(problem, materials)
-
-
-def _uav_violations(problem: Problem, materials: int | None) -> Iterator[Violation]:
-    seen: dict[str, int] = {}
-    x_limit, y_limit = _limits(problem.crs)
-    for i, uav in enumerate(problem.uavs):
-        # A problem of thousands is sound nearly always: what is wrong is looked for where anything is.
-        if (
-            -x_limit <= uav.x_s <= x_limit
-            and -y_limit <= uav.y_s <= y_limit
-            and -x_limit <= uav.x_c <= x_limit
-            and -y_limit <= uav.y_c <= y_limit
-            and MIN_MAGNITUDE <= uav.speed <= MAX_MAGNITUDE
-            and 0.0 <= uav.voyage <= MAX_MAGNITUDE
-            and 0.0 <= uav.dis <= MAX_MAGNITUDE
-            and _are_amounts(uav.loadlist, materials)
-            and _is_new(uav.id, seen, i)
-        ):
-            continue
-        at = f"/uavs/{i}"
-        yield from _identifier(at, uav.id, seen, i)
-        yield from _position(at, problem.crs, uav.x_s, uav.y_s, "x_s", "y_s")
-        yield from _position(at, problem.crs, uav.x_c, uav.y_c, "x_c", "y_c")
-        yield from _number(f"{at}/speed", uav.speed, low=MIN_MAGNITUDE)
-        yield from _number(f"{at}/voyage", uav.voyage, low=0.0)
-        yield from _number(f"{at}/dis", uav.dis, low=0.0)
-        yield from _amounts(f"{at}/loadlist", uav.loadlist, materials)
-
-
-def _target_violations(problem: Problem, materials: int | None) -> Iterator[Violation]:
-    seen: dict[str, int] = {}
-    x_limit, y_limit = _limits(problem.crs)
-    for j, target in enumerate(problem.targets):
-        if (
-            -x_limit <= target.x <= x_limit
-            and -y_limit <= target.y <= y_limit
-            and 0.0 <= target.level <= MAX_MAGNITUDE
-            and (target.deadline is None or -MAX_MAGNITUDE <= target.deadline <= MAX_MAGNITUDE)
-            and 0.0 <= target.service_time <= MAX_MAGNITUDE
-            and _are_amounts(target.loadlist, materials)
-            and (target.requested is None or _are_enough(target.requested, target.loadlist))
-            and _is_new(target.id, seen, j)
-        ):
-            continue
-        at = f"/targets/{j}"
-        yield from _identifier(at, target.id, seen, j)
-        yield from _position(at, problem.crs, target.x, target.y, "x", "y")
-        yield from _number(f"{at}/level", target.level, low=0.0)
-        if target.deadline is not None:
-            yield from _number(f"{at}/deadline", target.deadline)
-        yield from _number(f"{at}/service_time", target.service_time, low=0.0)
-        yield from _amounts(f"{at}/loadlist", target.loadlist, materials)
-        if target.requested is not None:
-            yield from _requested(f"{at}/requested", target.requested, target.loadlist, materials)
-
-
-def _number(
-    pointer: str, value: float, low: float = -MAX_MAGNITUDE, high: float = MAX_MAGNITUDE
-) -> Iterator[Violation]:
-    if not math.isfinite(value):
-        yield Violation(pointer, f"{value} is not a finite number")
-    elif not low <= value <= high:
-        yield Violation(pointer, f"{_written(value)} is not in {low:g}..{high:g}")
-
-
-def _written(value: float) -> str:
-    """Write a number briefly, but never as another one: 180.0000001 is not 180."""
-    brief = f"{value:g}"
-    return brief if float(brief) == value else repr(float(value))
-
-
-def _position(at: str, crs: str, x: float, y: float, x_name: str, y_name: str) -> Iterator[Violation]:
-    x_limit, y_limit = _limits(crs)
-    yield from _number(f"{at}/{x_name}", x, -x_limit, x_limit)
-    yield from _number(f"{at}/{y_name}", y, -y_limit, y_limit)
-
-
-def _limits(crs: str) -> tuple[float, float]:
-    return (180.0, 90.0) if crs == "wgs84" else (MAX_MAGNITUDE, MAX_MAGNITUDE)
-
-
-def _are_amounts(amounts: tuple[float, ...], materials: int | None) -> bool:
-    """Whether :func:`_amounts` has nothing to say; the sum finds what is not a number in any place."""
-    return bool(
-        amounts
-        and (materials is None or len(amounts) == materials)
-        and min(amounts) >= 0.0
-        and max(amounts) <= MAX_MAGNITUDE
-        and math.isfinite(sum(amounts))
-    )
-
-
-def _are_enough(requested: tuple[float, ...], needed: tuple[float, ...]) -> bool:
-    """Whether :func:`_requested` has nothing to say, where the needs are sound."""
-    return _are_amounts(requested, len(needed)) and not any(
-        ask < need * (1.0 - ROUNDING) for ask, need in zip(requested, needed, strict=True)
-    )
-
-
-def _is_new(identifier: str, seen: dict[str, int], index: int) -> bool:
-    """Whether :func:`_identifier` has nothing to say; the id is known from then on."""
-    sound = identifier not in seen and fault_of(identifier) is None
-    if sound:
-        seen[identifier] = index
-    return sound
-
-
-def _amounts(pointer: str, amounts: tuple[float, ...], materials: int | None) -> Iterator[Violation]:
-    if materials is not None and len(amounts) != materials:
-        yield Violation(pointer, f"{len(amounts)} amounts, but the first UAV carries {materials} materials")
-    for k, amount in enumerate(amounts):
-        yield from _number(f"{pointer}/{k}", amount, low=0.0)
-
-
-def _requested(
-    pointer: str, requested: tuple[float, ...], needed: tuple[float, ...], materials: int | None
-) -> Iterator[Violation]:
-    yield from _amounts(pointer, requested, materials)
-    for k, (ask, need) in enumerate(zip(requested, needed, strict=False)):
-        if ask < need * (1.0 - ROUNDING):
-            yield Violation(
-                f"{pointer}/{k}", f"{_written(ask)} is less than the {_written(need)} still needed"
-            )
-
-
-def _identifier(at: str, identifier: str, seen: dict[str, int], index: int) -> Iterator[Violation]:
-    fault = fault_of(identifier)
-    if fault is not None:
-        yield Violation(f"{at}/id", fault)
-    elif identifier in seen:
-        yield Violation(f"{at}/id", f"{identifier!r} is already the id of number {seen[identifier]}")
-    else:
-        seen[identifier] = index
-
-
-def _has_tiny(problem: Problem) -> bool:
-    """Whether any number of a sound problem is too small to count; one look at all of them."""
-    of_uavs = [(u.x_s, u.y_s, u.x_c, u.y_c, u.voyage, u.dis, *u.loadlist) for u in problem.uavs]
-    of_targets = [
-        (t.x, t.y, t.level, t.deadline or 0.0, t.service_time, *t.loadlist, *(t.requested or t.loadlist))
-        for t in problem.targets
-    ]
-    numbers = np.concatenate(
-        [np.ravel(of_uavs), np.ravel(of_targets), [problem.objective.distance_weight or 0.0]]
-    )
-    return bool(((np.abs(numbers) < MIN_MAGNITUDE) & (numbers != 0.0)).any())
-
-
-def _without_tiny(item: _Item) -> _Item:
-    """Return a UAV, a target or an objective in which every number that is too small to count is 0."""
-    changes = {each.name: _settled(getattr(item, each.name)) for each in fields(item)}  # type: ignore[arg-type]  # one of three dataclasses
-    return replace(item, **changes)  # type: ignore[type-var]  # as above
-
-
-def _settled(value: object) -> object:
-    if isinstance(value, tuple):
-        return tuple(_settled(each) for each in value)
-    return 0.0 if isinstance(value, float) and abs(value) < MIN_MAGNITUDE else value

@@ -1,43 +1,41 @@
 """Problems as plain JSON-ready records and back: how they are stored and sent between processes.
 
-A record is complete: every default has been filled in, so that it means the same in a later version.
+A record is complete: every default has been filled in, so that it means the same in a later version. The
+fields are those that are declared; what their kinds say of records is done here for many items at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from operator import attrgetter
 from typing import Any
 
-from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.fields import Conversion, Items, Kind, Part, declared_fields
+from app.domain.problem import Problem
 
-_UAV = tuple(field.name for field in fields(UAV))
-_TARGET = tuple(field.name for field in fields(Target))
 _PLAIN = (float, int, str, bool)
-_uav_values, _target_values = attrgetter(*_UAV), attrgetter(*_TARGET)
 
 
 def problem_to_record(problem: Problem) -> dict[str, Any]:
     """Turn a problem into a record, with the field names of the specification."""
-    return {
-        "uavs": [
-            dict(zip(_UAV, _uav_values(uav), strict=True), ret=int(uav.ret), loadlist=list(uav.loadlist))
-            for uav in problem.uavs
-        ],
-        "targets": [
-            dict(
-                zip(_TARGET, _target_values(target), strict=True),
-                loadlist=list(target.loadlist),
-                requested=None if target.requested is None else list(target.requested),
-            )
-            for target in problem.targets
-        ],
-        "max_steps": problem.max_steps,
-        "crs": problem.crs,
-        "objective": to_record(problem.objective),
-    }
+    return _recorded([problem], Problem)[0]
+
+
+def problem_from_record(record: Mapping[str, Any]) -> Problem:
+    """Turn a record into a problem.
+
+    Raises
+    ------
+    InvalidProblem
+        If the record breaks a rule of the problem.
+    KeyError, TypeError
+        If it is no record of :func:`problem_to_record`. A field that was not there yet when it was written
+        has its default.
+    """
+    problem: Problem = _read([record], Problem)[0]
+    return problem
 
 
 def to_record(value: Any) -> Any:
@@ -62,41 +60,85 @@ def to_record(value: Any) -> Any:
 
 @cache
 def _fields(of: type) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
-    """Return the names of a dataclass's fields, and what gets all their values at once."""
-    names = tuple(field.name for field in fields(of))
+    """Return the names of a dataclass's fields, and what gets all their values at once.
+
+    The order is that of the constructor. A checkpoint has a record in it, and the same checkpoint has the
+    same bytes in every version.
+    """
+    names = tuple(field.name for field in sorted(fields(of), key=attrgetter("kw_only")))
     if len(names) == 1:
         return names, lambda value: (getattr(value, names[0]),)
     return names, attrgetter(*names)
 
 
-def problem_from_record(record: Mapping[str, Any]) -> Problem:
-    """Turn a record into a problem.
+@dataclass(frozen=True, slots=True)
+class _Recording:
+    """How items of a dataclass with declared fields are recorded.
 
-    Raises
-    ------
-    InvalidProblem
-        If the record breaks a rule of the problem.
-    KeyError, TypeError
-        If it is no record of :func:`problem_to_record`.
+    Attributes
+    ----------
+    names
+        Of its fields.
+    values_of
+        Gets the values of all of them at once.
+    to_record, from_record
+        What turns the values of some of them into what JSON can hold, and back.
     """
-    return Problem(
-        uavs=tuple(
-            UAV(**{**u, "ret": bool(u["ret"]), "loadlist": tuple(u["loadlist"])}) for u in record["uavs"]
-        ),
-        targets=tuple(_target(t) for t in record["targets"]),
-        max_steps=record["max_steps"],
-        crs=record["crs"],
-        objective=Objective(**record["objective"]),
+
+    names: tuple[str, ...]
+    values_of: Callable[[Any], tuple[Any, ...]]
+    to_record: tuple[tuple[str, Conversion], ...]
+    from_record: tuple[tuple[str, Conversion], ...]
+
+
+@cache
+def _recording(of: type) -> _Recording:
+    converted = [(each.name, _conversions(each.kind)) for each in declared_fields(of)]
+    return _Recording(
+        *_fields(of),
+        tuple((name, conversions[0]) for name, conversions in converted if conversions),
+        tuple((name, conversions[1]) for name, conversions in converted if conversions),
     )
 
 
-def _target(record: Mapping[str, Any]) -> Target:
-    # Records from before targets had `requested` lack it.
-    requested = record.get("requested")
-    return Target(
-        **{
-            **record,
-            "loadlist": tuple(record["loadlist"]),
-            "requested": None if requested is None else tuple(requested),
-        }
-    )
+def _conversions(kind: Kind) -> tuple[Conversion, Conversion] | None:
+    """Return what turns values of a kind into records, and back; None where they are the same."""
+    if isinstance(kind, Items):
+        return lambda items: _recorded(items, kind.of), lambda records: tuple(_read(records, kind.of))
+    if isinstance(kind, Part):
+        return lambda part: _recorded([part], kind.of)[0], lambda record: _read([record], kind.of)[0]
+    return kind.conversions
+
+
+def _recorded(items: Iterable[Any], of: type) -> list[dict[str, Any]]:
+    recording = _recording(of)
+    names, values_of = recording.names, recording.values_of
+    records = [dict(zip(names, values_of(item))) for item in items]  # noqa: B905 - as long as each other, and quicker
+    for name, convert in recording.to_record:
+        for record in records:
+            value = record[name]
+            if value is not None:
+                record[name] = convert(value)
+    return records
+
+
+def _read(records: Iterable[Mapping[str, Any]], of: type) -> list[Any]:
+    return from_values([{**record} for record in records], of)
+
+
+def from_values(items: list[dict[str, Any]], of: type) -> list[Any]:
+    """Build a dataclass with declared fields of the values that records of its items have.
+
+    Parameters
+    ----------
+    items
+        Values by the names of the fields. They are used up: a problem has thousands, and a copy takes time.
+    of
+        The dataclass.
+    """
+    for name, convert in _recording(of).from_record:
+        for values in items:
+            # A record of an earlier version lacks fields, of which the constructor knows the defaults.
+            if values.get(name) is not None:
+                values[name] = convert(values[name])
+    return [of(**values) for values in items]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+from app.domain.fields import declared_fields
+from app.domain.problem import UAV, Target
 
 Point = tuple[float, float]
 
@@ -42,17 +44,14 @@ def geojson(plan: FlownPlan) -> str:
 
 def _start(route: FlownRoute) -> dict[str, Any]:
     uav = route.uav
-    return _feature(
-        "uav",
-        "Point",
-        [uav.x_c, uav.y_c],
-        uav_id=uav.id,
-        home=[uav.x_s, uav.y_s],
-        speed=uav.speed,
-        voyage=uav.voyage,
-        range_left=uav.voyage - uav.dis,
-        loadlist=list(uav.loadlist),
-    )
+    instead: dict[str, dict[str, Any]] = {
+        "id": {"uav_id": uav.id},
+        "x_s": {"home": [uav.x_s, uav.y_s]},
+        "dis": {"range_left": uav.voyage - uav.dis},
+        # It is where the point is, and what it does is in the plan.
+        **{name: {} for name in ("y_s", "x_c", "y_c", "ret")},
+    }
+    return _feature("uav", "Point", [uav.x_c, uav.y_c], **_fields(uav, instead))
 
 
 def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
@@ -60,21 +59,29 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
     features = []
     for target in plan.problem.targets:
         missing = unmet.get(target.id)
-        features.append(
-            _feature(
-                "area",
-                "Point",
-                [target.x, target.y],
-                target_id=target.id,
-                level=target.level,
-                requested=list(target.loadlist if target.requested is None else target.requested),
-                needs=list(target.loadlist),
-                remaining=[0.0] * len(target.loadlist) if missing is None else list(missing.remaining),
-                reason=None if missing is None else missing.reason,
-                deadline=target.deadline,
-            )
-        )
+        instead: dict[str, dict[str, Any]] = {
+            "id": {"target_id": target.id},
+            "loadlist": {
+                "requested": list(target.loadlist if target.requested is None else target.requested),
+                "needs": list(target.loadlist),
+                "remaining": [0.0] * len(target.loadlist) if missing is None else list(missing.remaining),
+                "reason": None if missing is None else missing.reason,
+            },
+            # The area is where the point is, and the stops of the routes have their times.
+            **{name: {} for name in ("x", "y", "service_time", "requested")},
+        }
+        features.append(_feature("area", "Point", [target.x, target.y], **_fields(target, instead)))
     return features
+
+
+def _fields(item: UAV | Target, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the fields of an item by their names, but for those in whose place something else is said."""
+    of: type = type(item)
+    properties: dict[str, Any] = {}
+    for each in declared_fields(of):
+        plain = {each.name: each.kind.to_record(getattr(item, each.name))}
+        properties.update(instead.get(each.name, plain))
+    return properties
 
 
 def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:

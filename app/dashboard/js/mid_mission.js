@@ -3,6 +3,7 @@
  * what is still carried and needed), and what a new plan changes against the old one. No page, no requests.
  */
 
+import { idOf } from "./kinds.js";
 import { sum } from "./plan.js";
 import { requestedBy } from "./problem.js";
 
@@ -36,8 +37,8 @@ export function between(crs, from, to, fraction) {
   return [degrees(Math.atan2(y, x)), degrees(Math.atan2(z, Math.hypot(x, y)))];
 }
 
-const uavId = (uav, i) => uav.id ?? `uav-${i + 1}`;
-const targetId = (target, j) => target.id ?? `area-${j + 1}`;
+const uavId = (uav, i) => idOf("uavs", uav, i);
+const targetId = (target, j) => idOf("targets", target, j);
 const rounded = (amount) => (Math.abs(amount) < 1e-9 ? 0 : amount);
 const less = (amounts, taken) => amounts.map((amount, k) => Math.max(0, rounded(amount - taken[k])));
 

@@ -1,12 +1,13 @@
 /** The problem on screen: making, editing, undoing. All of it in the API's own fields. */
 
 import { change } from "./history.js";
-import { isAmounts } from "./schema.js";
+import { STEMS } from "./kinds.js";
+import { amountsOf } from "./schema.js";
 import { BEGINNING, get, select, set } from "./state.js";
 
 /** A problem with ids filled in and what is not set left out. */
 export function normalised({ uavs = [], targets = [], ...settings }) {
-  return { ...present(settings), uavs: named(uavs, "uav"), targets: named(targets, "area") };
+  return { ...present(settings), uavs: named(uavs, STEMS.uavs), targets: named(targets, STEMS.targets) };
 }
 
 /** Items with ids: the service's own by place in the list, or the next that is free. */
@@ -79,7 +80,7 @@ export function move(kind, id, { x, y }) {
 export function place(kind, { x, y }) {
   const { problem } = get();
   const last = problem[kind].at(-1);
-  const id = freeId(problem[kind], kind === "uavs" ? "uav" : "area");
+  const id = freeId(kind, problem[kind]);
   const loadlist = last ? [...last.loadlist] : new Array(materials(problem)).fill(kind === "uavs" ? 10 : 5);
   const item =
     kind === "uavs"
@@ -89,11 +90,12 @@ export function place(kind, { x, y }) {
   select({ kind, id });
 }
 
-function freeId(items, stem) {
+/** An id that none of the items has. @param {"uavs"|"targets"} kind */
+export function freeId(kind, items) {
   const taken = new Set(items.map((item) => item.id));
   let n = items.length + 1;
-  while (taken.has(`${stem}-${n}`)) n += 1;
-  return `${stem}-${n}`;
+  while (taken.has(`${STEMS[kind]}-${n}`)) n += 1;
+  return `${STEMS[kind]}-${n}`;
 }
 
 /** A range that a first UAV is given: three times across the areas, or as far as a plain number goes. */
@@ -107,7 +109,7 @@ function reach(problem) {
 export function setMaterials(count) {
   const { fields } = get();
   const fitted = (kind, items) => {
-    const names = Object.keys(fields[kind]).filter((name) => isAmounts(fields[kind][name]));
+    const names = amountsOf(fields[kind]);
     const amounts = (list) => Array.from({ length: count }, (_, k) => list[k] ?? 0);
     return items.map((item) => ({ ...item, ...Object.fromEntries(names.filter((name) => item[name]).map((name) => [name, amounts(item[name])])) }));
   };

@@ -32,6 +32,11 @@ export function isAmounts(schema) {
   return schema.type === "array" && ["number", "integer"].includes(schema.items?.type);
 }
 
+/** Names of the fields that hold one amount a material, of those of an item. */
+export function amountsOf(fields) {
+  return Object.keys(fields).filter((name) => isAmounts(fields[name]));
+}
+
 /** What a value has to be, where it is not that; null where it is. */
 export function wanted(value, schema) {
   if (schema.enum) return schema.enum.includes(value) ? null : `one of ${schema.enum.join(", ")}`;

@@ -2,6 +2,7 @@
 
 import { paint } from "./colours.js";
 import { svg } from "./dom.js";
+import { idOf } from "./kinds.js";
 
 /**
  * Draw a task.
@@ -23,7 +24,7 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
   const dx = (width - scale * (right - left)) / 2;
   const dy = (height - scale * (high - low)) / 2;
   const at = ([x, y]) => [dx + (x - left) * scale, height - dy - (y - low) * scale];
-  const byId = new Map(task.targets.map((target, j) => [target.id ?? `area-${j + 1}`, target]));
+  const byId = new Map(task.targets.map((target, j) => [idOf("targets", target, j), target]));
   answer?.routes.forEach((route, i) => {
     if (!route.stops.length) return;
     const uav = task.uavs[i];
@@ -39,7 +40,7 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
   task.targets.forEach((target, j) => {
     const [cx, cy] = at([target.x, target.y]);
     const urgency = target.level / most;
-    const met = answer && !unmet.has(target.id ?? `area-${j + 1}`);
+    const met = answer && !unmet.has(idOf("targets", target, j));
     picture.append(
       svg("circle", {
         cx: cx.toFixed(1), cy: cy.toFixed(1), r: (2.5 + 2.5 * urgency).toFixed(1), class: met ? "area met" : "area",

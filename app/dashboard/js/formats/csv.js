@@ -1,10 +1,10 @@
 /** A problem as CSV: a row an item, one of `kind` problem for the settings. Columns are the service's fields. */
 
-import { isAmounts } from "../schema.js";
+import { KINDS } from "../kinds.js";
+import { amountsOf, isAmounts } from "../schema.js";
 import { Numbers, plainText, table, toCells } from "./cells.js";
 import { FormatError } from "./error.js";
 
-const KINDS = { uav: "uavs", area: "targets" };
 const TRUTHS = { true: true, yes: true, 1: true, false: false, no: false, 0: false };
 
 /** What columns of amounts are named, before their number. */
@@ -20,8 +20,8 @@ function settingsOf(fields) {
 
 export function toCsv(problem, fields) {
   const settings = settingsOf(fields);
-  const kinds = Object.entries(KINDS).map(([kind, list]) => ({ kind, list, count: Math.max(0, ...problem[list].map((item) => item.loadlist.length)) }));
-  const count = Math.max(...kinds.map((each) => each.count));
+  const kinds = Object.entries(KINDS).map(([kind, list]) => ({ kind, list }));
+  const count = Math.max(0, ...kinds.flatMap(({ list }) => problem[list].flatMap((item) => amountsOf(fields[list]).map((name) => item[name]?.length ?? 0))));
   const names = (name, schema) => (isAmounts(schema) ? Array.from({ length: count }, (_, k) => `${stem(name)}_${k + 1}`) : [name]);
   const own = kinds.flatMap(({ list }) => Object.entries(fields[list]).flatMap(([name, schema]) => names(name, schema)));
   const columns = [...new Set(["kind", ...own, ...settings.map(({ column }) => column)])];

@@ -1,10 +1,10 @@
 /** A problem as GeoJSON (RFC 7946): points with the service's fields as properties, settings as a member. */
 
+import { KINDS } from "../kinds.js";
 import { position } from "../problem.js";
 import { isAmounts } from "../schema.js";
 import { FormatError } from "./error.js";
 
-const KINDS = { uav: "uavs", area: "targets" };
 /** Names of longitude and latitude on WGS 84. */
 const DEGREES = /(CRS84h?|EPSG:[\d.]*:?(4326|4979))$/i;
 

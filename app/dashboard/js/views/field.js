@@ -7,6 +7,7 @@ import { changes, missionEnd, moments, problemAt, remainder, uavAt, withNeeds } 
 import { sum } from "../plan.js";
 import { answeredBy } from "../plan_notes.js";
 import { Portions } from "../portions.js";
+import { freeId } from "../problem.js";
 import { registerView } from "../registry.js";
 import { allocate } from "../running.js";
 import { BEGINNING, get, set, subscribe } from "../state.js";
@@ -293,11 +294,9 @@ function changed(target, fields) {
 function discover() {
   const { targets } = present();
   const middle = (name) => targets.reduce((total, target) => total + target[name], 0) / targets.length;
-  let n = targets.length + 1;
-  while (targets.some(({ id }) => id === `area-${n}`)) n += 1;
   const level = Math.max(...targets.map((target) => target.level));
   const loadlist = targets[0].loadlist.map((_, k) => Math.max(...plan().problem.targets.map((target) => target.loadlist[k])));
-  const area = { id: `area-${n}`, x: Number(middle("x").toFixed(6)), y: Number(middle("y").toFixed(6)), level, loadlist };
+  const area = { id: freeId("targets", targets), x: Number(middle("x").toFixed(6)), y: Number(middle("y").toFixed(6)), level, loadlist };
   noteArea({ found: [...get().mission.found, area] });
 }
 

@@ -9,16 +9,18 @@ import { redo, undo } from "../history.js";
 import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
-import { isAmounts } from "../schema.js";
+import { amountsOf, isAmounts } from "../schema.js";
 import { get, select, subscribe } from "../state.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
-/** What people call the fields; those that are not here go by their own names. */
+/** What people call the fields that have other names; all others go by their own. */
 const TITLES = {
-  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", speed: "speed", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
-  targets: { id: "Area", x: "x", y: "y", level: "urgency", deadline: "deadline", service_time: "service time", loadlist: "need", requested: "requested" },
+  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
+  targets: { id: "Area", level: "urgency", loadlist: "need" },
 };
 const KINDS = { uavs: "UAVs", targets: "Areas" };
+/** Types of settings that have one value, and so one form field. */
+const SINGLE = ["number", "integer", "boolean", "string"];
 const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
 const NOT_SAID = "The service has not said yet which fields a problem has";
 
@@ -195,16 +197,19 @@ function mountInspector(root) {
 function mountSettings(root) {
   const numeric = (name, value, take) => h("input", { value: String(value), inputmode: "numeric", name, onchange: (event) => take(Number(event.target.value)) });
   const draw = () => {
-    const { problem, fields: { settings } } = get();
-    const { crs, max_steps: steps, ...others } = settings;
+    const { problem, fields } = get();
+    const { crs, max_steps: steps, ...others } = fields.settings;
+    const mostKinds = Math.min(...amountsOf(fields.uavs).map((name) => fields.uavs[name].maxItems));
     const most = numeric("max_steps", problem.max_steps ?? steps.default, (count) => (Number.isInteger(count) ? edit(() => ({ max_steps: count })) : draw()));
-    const kinds = numeric("materials", materials(problem), (count) => (count >= 1 && count <= 64 ? setMaterials(Math.trunc(count)) : draw()));
+    const kinds = numeric("materials", materials(problem), (count) => (count >= 1 && count <= mostKinds ? setMaterials(Math.trunc(count)) : draw()));
     const where = h("select", { name: "crs", onchange: () => edit(() => ({ crs: where.value })) }, crs.enum.map((value) => h("option", { value, selected: value === (problem.crs ?? crs.default) }, PLACES[value] ?? value)));
+    const single = Object.fromEntries(Object.entries(others).filter(([, { type, enum: words }]) => words || SINGLE.includes(type)));
+    const further = new Fields(single, { pointer: "", values: problem, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
     const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties }]) => {
       const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], onchange: () => edit(() => ({ [name]: form.values() })) });
       return form.element;
     });
-    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...own);
+    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
   };
   let known = null;
   const redraw = ({ problem, fields }) => {

@@ -1,0 +1,12 @@
+/** The two kinds of items of a problem, and the ids of those that have none. */
+
+/** By the `kind` that rows of a table and features of a map have: the list of the problem they are of. */
+export const KINDS = { uav: "uavs", area: "targets" };
+
+/** What ids begin with, by the list. */
+export const STEMS = Object.fromEntries(Object.entries(KINDS).map(([kind, list]) => [list, kind]));
+
+/** The id of an item at a place in a list, from 0; the service's own where it has none. */
+export function idOf(list, item, at) {
+  return item.id ?? `${STEMS[list]}-${at + 1}`;
+}
