@@ -118,6 +118,28 @@ class UserFolder(_FollowsImports, caching.UserWideCacheLocator):
     """Keeps machine code in the user's folder of such files otherwise."""
 
 
+class UnreadableIsMissing(caching.IndexDataCacheFile):
+    """Kept machine code that cannot be read is compiled anew.
+
+    Its index names modules and classes, which may have moved since, and a power cut may have left a part.
+    """
+
+    def load(self, key: Any) -> Any:
+        """Return the entry of a key; None where there is none that can be read."""
+        try:
+            return super().load(key)  # type: ignore[no-untyped-call]  # untyped in numba
+        except Exception:
+            return None
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()  # type: ignore[no-untyped-call]  # untyped in numba
+        except Exception:
+            return {}
+
+
+caching.IndexDataCacheFile = UnreadableIsMissing  # type: ignore[misc]  # numba has no hook for it
+
 _OWN = (ProvidedFolder, BesideSource, UserFolder)
 # Numba asks for its locators by name, at every function that is decorated with ``cache=True`` from now on.
 # Its own two others are for functions without a file, and for packages in a ZIP.

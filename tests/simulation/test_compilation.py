@@ -2,11 +2,15 @@
 
 import importlib
 import inspect
+import pickle
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
+import numba
+import pytest
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
@@ -57,6 +61,26 @@ def test_several_writers_of_one_cache(tmp_path):
     assert [writer.returncode for writer in writers] == [0] * 4
     assert sum(compiled) == 16
     subprocess.run([*command, "0", str(start)], check=True, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("kind", "kept"),
+    [("nbi", pickle.dumps(numba.__version__) + b"capp.no_such_module\nNo\n."), ("nbc", b"\x80\x04\x95")],
+    ids=["an index of code that has moved", "a part of machine code"],
+)
+def test_what_cannot_be_read_is_compiled_anew(tmp_path, kind, kept):
+    (tmp_path / "doubling.py").write_text(MODULE)
+    start = tmp_path / "start"
+    start.touch()
+    command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n{PROGRAM}"]
+    run = partial(subprocess.run, check=True, timeout=120, capture_output=True)
+    run([*command, "1", str(start)])
+    files = list(tmp_path.rglob(f"*.{kind}"))
+    assert files
+    for file in files:
+        file.write_bytes(kept)
+    assert int(run([*command, "2", str(start)]).stdout) == 16
+    assert int(run([*command, "0", str(start)]).stdout) == 0
 
 
 ROOT = Path(__file__).parents[2]
