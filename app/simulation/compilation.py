@@ -184,7 +184,7 @@ _compiled_here = [0]
 
 @contextmanager
 def _few_collections() -> Iterator[None]:
-    """Compile without looking for garbage all the time: a fifth of the time, as most objects are kept."""
+    """Compile without looking for garbage all the time, as most objects are kept."""
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS, *before[1:])
     try:
