@@ -34,7 +34,7 @@ _GRID = 2.0**-33
 """Distance between the points that corners are rounded to, in the same unit: an eighth of the tolerance."""
 
 _MITRE = 4.0
-"""How far a narrowed corner may recede, in widths of what is taken away; a larger one is cut off."""
+"""Where a corner points into a zone: farthest that the narrowed border is from it, in tolerances."""
 
 _EDGES = 16
 """Most edges of one outline."""
