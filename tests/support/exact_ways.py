@@ -1,0 +1,171 @@
+"""Shortest ways round zones in rational numbers: slow, and independent of the service's.
+
+Everything hangs on one question: whether a way may pass a point, coming from one direction and leaving in
+another. It may not where zones lie on its left and on its right, however near to the point: then the point
+is inside their union, or they touch there. A straight piece is free if it may pass the middle of every
+stretch between two borders that it meets, and the points where it meets them. A way may turn at a corner if
+it may pass it so.
+"""
+
+import heapq
+import math
+from fractions import Fraction
+from itertools import pairwise
+
+Point = tuple[Fraction, Fraction]
+
+
+class ExactWays:
+    """Ways round zones that are given by corners with rational coordinates; no two sides of one cross."""
+
+    def __init__(self, zones):
+        self.zones = [[exact(corner) for corner in zone] for zone in zones]
+        self.edges = [edge for zone in self.zones for edge in zip(zone, zone[1:] + zone[:1], strict=True)]
+        self.corners = sorted({corner for zone in self.zones for corner in zone})
+        self._free = {}
+
+    def length(self, a, b):
+        """Length of the shortest way; infinite where there is none."""
+        a, b = exact(a), exact(b)
+        if self.inside(a) or self.inside(b):
+            return math.inf
+        if a == b or self.free(a, b):
+            return math.dist(a, b)
+        best = {}
+        heap = [(math.dist(a, c), a, c) for c in self.corners if c != a and self.free(a, c)]
+        heapq.heapify(heap)
+        while heap:
+            length, before, here = heapq.heappop(heap)
+            if (before, here) in best:
+                continue
+            best[before, here] = length
+            if here == b:
+                return length
+            for onward in (b, *self.corners):
+                if (
+                    onward not in (here, before)
+                    and (here, onward) not in best
+                    and self.free(here, onward)
+                    and self.may_pass(here, minus(before, here), minus(onward, here))
+                ):
+                    heapq.heappush(heap, (length + math.dist(here, onward), here, onward))
+        return math.inf
+
+    def inside(self, point):
+        """Whether a point lies in the interior of the union."""
+        return all(solid for _, _, solid in self._around(point, [(1, 0), (-1, 0), (0, 1)]))
+
+    def free(self, a, b):
+        """Whether the straight way between two different points is free."""
+        key = (a, b) if a <= b else (b, a)
+        if key not in self._free:
+            self._free[key] = self._is_free(*key)
+        return self._free[key]
+
+    def _is_free(self, a, b):
+        way = minus(b, a)
+        met = {Fraction(0), Fraction(1)}
+        for c, d in self.edges:
+            met.update(t for t in meetings(a, way, c, d) if 0 < t < 1)
+        met = sorted(met)
+        tried = met[1:-1] + [(s + t) / 2 for s, t in pairwise(met)]
+        back = (-way[0], -way[1])
+        return all(self.may_pass((a[0] + t * way[0], a[1] + t * way[1]), back, way) for t in tried)
+
+    def may_pass(self, point, back, ahead):
+        """Whether a way from the direction `back` to the direction `ahead` may pass a point."""
+        if turn(back, ahead) == 0 and dot(back, ahead) > 0:
+            return True
+        around = self._around(point, [back, ahead])
+        k = next(k for k, (left, _, _) in enumerate(around) if same(left, back))
+        solid = [False, False]
+        side = 0
+        for left, _, filled in around[k:] + around[:k]:
+            side = 1 if same(left, ahead) else side
+            solid[side] |= filled
+        return not all(solid)
+
+    def _around(self, point, directions):
+        """Sectors around a point between directions and borders: from, to, and whether they are solid."""
+        directions = list(directions)
+        for c, d in self.edges:
+            if on(point, c, d):
+                directions += [minus(end, point) for end in (c, d) if end != point]
+        distinct = []
+        for direction in sorted(directions, key=Angle):
+            if not distinct or not same(distinct[-1], direction):
+                distinct.append(direction)
+        sectors = []
+        for left, right in zip(distinct, distinct[1:] + distinct[:1], strict=True):
+            between = (left[0] + right[0], left[1] + right[1])
+            if turn(left, right) < 0:
+                between = (-between[0], -between[1])
+            elif turn(left, right) == 0:
+                between = (-left[1], left[0])
+            sectors.append((left, right, self._solid(point, between)))
+        return sectors
+
+    def _solid(self, point, direction):
+        """Whether points in a direction, which is that of no border, are inside a zone however near."""
+        ahead = [t for c, d in self.edges for t in meetings(point, direction, c, d) if t > 0]
+        t = min(ahead, default=Fraction(1)) / 2
+        near = (point[0] + t * direction[0], point[1] + t * direction[1])
+        return any(odd(near, zone) for zone in self.zones)
+
+
+class Angle:
+    """Sorts directions counter-clockwise from east."""
+
+    def __init__(self, direction):
+        self.direction = direction
+        x, y = direction
+        self.half = 0 if y > 0 or (y == 0 and x > 0) else 1
+
+    def __lt__(self, other):
+        if self.half != other.half:
+            return self.half < other.half
+        return turn(self.direction, other.direction) > 0
+
+
+def exact(point) -> Point:
+    return (Fraction(point[0]), Fraction(point[1]))
+
+
+def minus(a, b):
+    return (a[0] - b[0], a[1] - b[1])
+
+
+def turn(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def same(a, b):
+    return turn(a, b) == 0 and dot(a, b) > 0
+
+
+def on(point, c, d):
+    """Whether a point lies on a side, its ends included."""
+    return turn(minus(point, c), minus(d, c)) == 0 and dot(minus(point, c), minus(point, d)) <= 0
+
+
+def meetings(a, way, c, d):
+    """How far along a line, in lengths of `way`, it meets a side: once, at both ends of it, or never."""
+    side, gap = minus(d, c), minus(c, a)
+    across = turn(way, side)
+    if across == 0:
+        return [dot(minus(end, a), way) / dot(way, way) for end in (c, d)] if turn(gap, way) == 0 else []
+    return [turn(gap, side) / across] if 0 <= turn(gap, way) / across <= 1 else []
+
+
+def odd(point, zone):
+    """Whether a point, not on the border, is inside a zone: a line from it crosses an odd number of sides."""
+    x, y = point
+    inside = False
+    for (ax, ay), (bx, by) in zip(zone, zone[1:] + zone[:1], strict=True):
+        if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+            inside = not inside
+    return inside
