@@ -14,6 +14,7 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -165,8 +166,7 @@ class JobStore(JobQueries):
 
     def _waits(self, connection: Connection, lanes: Iterable[Lane]) -> bool:
         """Say whether a job waits in one of the lanes."""
-        waits = sa.select(sa.literal(1)).where(_QUEUED, jobs.c.lane.in_(list(lanes))).limit(1)
-        return connection.scalar(waits) is not None
+        return connection.scalar(_one_in(tuple(lanes))) is not None
 
     def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
         of_client = idempotency_keys.c.client == idempotency.client
@@ -382,3 +382,10 @@ class JobStore(JobQueries):
         oldest = jobs.c.number.in_(old.order_by(jobs.c.finished_at).limit(limit))
         with self.database.write() as connection:
             return connection.execute(sa.delete(jobs).where(oldest, jobs.c.status.in_(FINISHED))).rowcount
+
+
+@cache
+def _one_in(lanes: tuple[Lane, ...]) -> sa.Select[int]:
+    """Select something if a job waits in one of the lanes."""
+    in_one = sa.or_(*(jobs.c.lane == lane for lane in lanes))
+    return sa.select(sa.literal(1)).where(_QUEUED, in_one).limit(1)
