@@ -35,8 +35,8 @@ from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.api.threads import started_threads
 from app.jobs import stored_json
-from app.jobs.executor import Executor
-from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED, LocalExecutor
+from app.jobs.executor import KEEPS_MEMORY, SINGLE_THREADED, Executor
+from app.jobs.local import LocalExecutor
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.library.seeding import seed_library
@@ -105,7 +105,7 @@ def create_application(settings: Settings) -> FastAPI:
                 retention_s=settings.job_retention_s,
                 observer=metrics,
             )
-            metrics.watch(service.load, store.count, database.size)
+            metrics.watch(service.load, service.waiting, store.count, database.size)
             await service.start()
             # What is there now stays: to look through it for garbage would only hold up requests.
             gc.collect()

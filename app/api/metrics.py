@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
@@ -10,7 +11,7 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 from sqlalchemy.exc import SQLAlchemyError
 
-from app.jobs.model import Job, Load
+from app.jobs.model import Job, Lane, Load
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "DELETE", "PUT", "PATCH", "OPTIONS"})
 _UNMATCHED = "unmatched"
@@ -21,7 +22,7 @@ _RUN_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 
 
 
 class Metrics:
-    """The metrics of one application; an observer of its jobs (:class:`app.jobs.observer.JobObserver`).
+    """The metrics of one application; an observer of its jobs (:class:`app.jobs.model.JobObserver`).
 
     Labels have values that are known beforehand: routes as templates, methods, statuses, algorithms. What a
     client can make up is no label.
@@ -79,20 +80,24 @@ class Metrics:
             self._ran.labels(job.kind, job.payload.get("algorithm", "")).observe(ran_s)
 
     def watch(
-        self, load: Callable[[], Load], policies: Callable[[], int], database_bytes: Callable[[], int]
+        self,
+        load: Callable[[], Load],
+        waiting: Callable[[], Mapping[Lane, int]],
+        policies: Callable[[], int],
+        database_bytes: Callable[[], int],
     ) -> None:
         """Say where what is measured at each look comes from; what does not answer is left out of it.
 
         Parameters
         ----------
-        load
-            Of the jobs.
+        load, waiting
+            Of the jobs: how busy the workers are, and how many wait by lane.
         policies
             How many the library has.
         database_bytes
             Size of the database.
         """
-        self.registry.register(_Levels(load, policies, database_bytes))
+        self.registry.register(_Levels(load, waiting, policies, database_bytes))
 
     def render(self) -> bytes:
         """Return all metrics in Prometheus' text format."""
@@ -103,9 +108,13 @@ class _Levels(Collector):
     """What is as it is, and is not counted as it happens."""
 
     def __init__(
-        self, load: Callable[[], Load], policies: Callable[[], int], database_bytes: Callable[[], int]
+        self,
+        load: Callable[[], Load],
+        waiting: Callable[[], Mapping[Lane, int]],
+        policies: Callable[[], int],
+        database_bytes: Callable[[], int],
     ) -> None:
-        self._load = load
+        self._load, self._waiting = load, waiting
         self._of_store = {
             "allocator_library_policies": ("Source policies in the library", policies),
             "allocator_database_bytes": ("Size of the database", database_bytes),
@@ -118,14 +127,9 @@ class _Levels(Collector):
     def collect(self) -> Iterator[Metric]:
         """Look."""
         load = self._load()
-        for name, text, levels in (
-            ("allocator_jobs_waiting", "Jobs that wait", load.waiting),
-            ("allocator_jobs_running", "Jobs that run", load.running),
-        ):
-            jobs = GaugeMetricFamily(name, text, labels=["lane"])
-            for lane, level in levels.items():
-                jobs.add_metric([lane], level)
-            yield jobs
+        with suppress(SQLAlchemyError):
+            yield _by_lane("allocator_jobs_waiting", "Jobs that wait", self._waiting())
+        yield _by_lane("allocator_jobs_running", "Jobs that run", load.running)
         yield GaugeMetricFamily("allocator_workers", "Workers there are when all are well", load.capacity)
         yield GaugeMetricFamily("allocator_workers_ready", "Workers that are warm", load.ready)
         yield CounterMetricFamily("allocator_worker_restarts", "Workers that were replaced", load.restarts)
@@ -134,3 +138,10 @@ class _Levels(Collector):
                 yield GaugeMetricFamily(name, text, ask())
             except SQLAlchemyError:
                 continue
+
+
+def _by_lane(name: str, text: str, levels: Mapping[Lane, int]) -> GaugeMetricFamily:
+    jobs = GaugeMetricFamily(name, text, labels=["lane"])
+    for lane, level in levels.items():
+        jobs.add_metric([lane], level)
+    return jobs

@@ -1,9 +1,16 @@
-"""The clock of the jobs: seconds since 1970 that pass evenly, whatever is done to the system's clock."""
+"""Time: a clock that passes evenly, waiting at most so long, and what is done again and again."""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+
+_PAUSE_S = 0.1
+
+_log = logging.getLogger(__name__)
 
 
 class Clock:
@@ -33,3 +40,54 @@ class Clock:
     def follow(self) -> None:
         """Take over the system's time; only while no job waits or runs."""
         self._offset = self._system() - self._steady()
+
+
+class Loop:
+    """Does a step again and again, until the end.
+
+    Parameters
+    ----------
+    step
+        Does all there is to do now, and returns in how many seconds it is to be called again if nothing wakes
+        the loop before; None: then only.
+    failure
+        What is logged if the step raises; it is called again after a pause.
+
+    Attributes
+    ----------
+    ended
+        Whether :meth:`end` was called.
+    """
+
+    def __init__(self, step: Callable[[], Awaitable[float | None]], failure: str) -> None:
+        self._step, self._failure = step, failure
+        self._woken = asyncio.Event()
+        self.ended = False
+
+    def wake(self) -> None:
+        """Let the step be done soon; if it is being done, once more after that."""
+        self._woken.set()
+
+    def end(self) -> None:
+        """Make :meth:`run` return after the step that it is at."""
+        self.ended = True
+        self.wake()
+
+    async def run(self) -> None:
+        """Do the step until the end."""
+        while not self.ended:
+            self._woken.clear()
+            try:
+                pause_s = await self._step()
+            except Exception:
+                _log.exception("%s; there will be another try", self._failure)
+                await asyncio.sleep(_PAUSE_S)
+            else:
+                await wait_for(self._woken, pause_s)
+
+
+async def wait_for(event: asyncio.Event, timeout_s: float | None) -> None:
+    """Wait for an event, at most so long; None: without a limit."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(timeout_s):
+            await event.wait()

@@ -1,7 +1,8 @@
 """Takes jobs in, gives them to workers, and brings what becomes of them into the table.
 
 Everything here runs on one event loop; what touches the disk runs in threads. All writing to the job table
-goes through one thread, so what is known here about the table changes in the order of its commits.
+goes through one thread, so what is known here about the table changes in the order of its commits. What is
+known here can be thrown away at any moment: it says when to look at the table, and the table says what is.
 """
 
 from __future__ import annotations
@@ -10,41 +11,44 @@ import asyncio
 import logging
 import random
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
 from structlog.contextvars import bind_contextvars
 
-from app.jobs.channel import Channels
+from app.jobs.attempts import Attempt, Attempts, Writer, complete
+from app.jobs.capacity import REMEMBERED_DURATIONS, Capacity, QueueLimit
+from app.jobs.clock import Loop
 from app.jobs.errors import Draining, UnknownJobKind
+from app.jobs.events import EventStreams
 from app.jobs.executor import Execution, Executor
 from app.jobs.follow_up import FollowUps
-from app.jobs.housekeeping import Housekeeping
-from app.jobs.lanes import REMEMBERED_DURATIONS, Lanes, QueueLimit
-from app.jobs.model import LANES, Idempotency, Job, JobKind, JobStatus, JobSummary, Lane, Load, Progress
-from app.jobs.observer import JobObserver
+from app.jobs.maintenance import Maintenance
+from app.jobs.model import LANES, Idempotency, Job, JobKind, JobObserver, JobStatus, Lane, Load
 from app.jobs.overdue import OverdueJobs
-from app.jobs.peers import Reactions
-from app.jobs.recovery import Recovery
-from app.jobs.run import Run, Runs, handed_over
-from app.jobs.settling import Settling
-from app.jobs.shared import peers_on
-from app.jobs.spawning import spawn
+from app.jobs.peers import peers_on
+from app.jobs.queries import Claim
 from app.jobs.store import JobStore
-from app.jobs.transitions import Claim
-from app.jobs.waiting import Waiting
-from app.jobs.writer import Writer
 from app.logs import labels
 
-_PAUSE_S = 0.1
 _SETTLE_S = 20.0
 # Those who are told when to come again do not all come at once.
 _LATEST_RETURN = 1.5
 
 _log = logging.getLogger(__name__)
-J = TypeVar("J", bound=JobSummary)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a service allows, see :class:`app.jobs.service.JobService`."""
+
+    max_queued: Mapping[Lane, int]
+    overrun_grace_s: float
+    retention_s: float | None
+    lease_s: float
 
 
 class Dispatcher:
@@ -54,116 +58,81 @@ class Dispatcher:
     ----------
     store
         The job table.
-    owner
-        In whose name the store takes jobs.
-    kinds, executor, reserve, max_queued, overrun_grace_s, retention_s, observer, lease_s
+    executor, reserve, observer
         As given to :class:`app.jobs.service.JobService`.
-    channels
-        Who listens to which job.
+    limits
+        What is allowed.
+
+    Attributes
+    ----------
+    attempts
+        The attempts that run here.
+    events
+        Tell those who listen what happens to jobs.
     """
 
     def __init__(
         self,
         store: JobStore,
-        owner: str,
-        kinds: Sequence[JobKind],
         executor: Executor,
         reserve: Executor | None,
-        channels: Channels,
-        *,
-        max_queued: Mapping[Lane, int],
-        overrun_grace_s: float,
-        retention_s: float | None,
-        observer: JobObserver,
-        lease_s: float,
+        observer: JobObserver | None,
+        limits: Limits,
     ) -> None:
-        self._store = store
-        self._kinds = {kind.name: kind for kind in kinds}
+        self._store, self._limits, self._observer = store, limits, observer
+        self._grace_s = limits.overrun_grace_s
+        self._kinds = store.kinds
         self._executor, self._reserve = executor, reserve
-        self._channels = channels
-        self._max_queued = max_queued
-        self._grace_s = overrun_grace_s
-        self._observer = observer
-        self._writer = Writer()
-        self._settling = Settling(store, self._writer, self._kinds, overrun_grace_s)
-        self._lanes = Lanes(executor.capacity)
-        self._runs, self._clock = Runs(), store.clock
-        self._wake = asyncio.Event()
-        self._peers = peers_on(store.database, owner, lease_s, self._writer, self._runs, channels)
-        self._overdue = OverdueJobs(self._answer_at_once, self._clock.now)
-        self._follow_ups = FollowUps(store.unfinished, self._writer, self._kinds, reserve, self._has_spare)
-        self._waiting = Waiting(
-            self._lanes,
-            self._kinds,
-            None if reserve is None else self._overdue,
-            self._peers,
-            self._wake,
+        self.attempts, self.events = Attempts(), EventStreams(store, self.runs)
+        self._capacity, self._writer = Capacity(executor.capacity), Writer()
+        self._peers = peers_on(store.database, store.owner, limits.lease_s)
+        self._overdue = OverdueJobs(
+            self._answer_at_once, store.clock.now, lambda: reserve is not None and reserve.ready > 0
         )
-        self._recovery = Recovery(
-            store,
-            self._writer,
-            self._kinds,
-            self._peers,
-            self._waiting,
-            partial(self._tell_end, ran_s=None),
-        )
-        self._reserve_ready = asyncio.Event()
-        self._dispatching: asyncio.Task[None] | None = None
-        self._house = Housekeeping(store, self._writer, self._runs, self._recovery.look_after, retention_s)
-        self._keeping: list[asyncio.Task[None]] = []
+        self._follow_ups = FollowUps(store, self._writer, reserve, self._has_spare)
+        rest = self._peers, self, limits.retention_s
+        self._maintenance = Maintenance(store, self._writer, self.attempts, *rest)
+        self._loop = Loop(self._dispatch, "no job could be taken from the queue")
+        self._loops: list[asyncio.Task[None]] = []
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
-        self._accepting = False
-        self._ended = asyncio.Event()
+        self._accepting = self._ended = False
 
     async def start(self) -> None:
         """Make the tables, give back what an earlier process left running, and begin to work."""
         await self._writer.write(self._store.migrate)
-        await self._peers.join(
-            Reactions(
-                self._waiting.heard,
-                self._waiting.forget,
-                lambda run: run.stop(self._grace_s),
-                self._recovery.give_back,
-                self._recovery.look_after,
-            )
-        )
-        await self._recovery.look_after()
+        await self._peers.join(self._writer, self._hear)
+        await self._maintenance.recover()
         for lane in LANES:
             durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
-            self._lanes.ran(lane, durations)
+            self._capacity.ran(lane, durations)
         self._accepting = True
-        await self._executor.start(self._wake.set)
+        await self._executor.start(self._loop.wake)
         if self._reserve is not None:
-            await self._reserve.start(self._reserve_ready.set)
-        self._wake.set()
-        self._dispatching = asyncio.create_task(self._dispatch())
-        keepers = self._house, self._overdue, self._follow_ups
-        self._keeping = [asyncio.create_task(keeper.keep()) for keeper in keepers]
+            await self._reserve.start(self._overdue.loop.wake)
+        loops = self._loop, self._overdue.loop, self._follow_ups.loop, self._maintenance.loop
+        self._loops = [asyncio.create_task(loop.run()) for loop in loops]
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
         self._accepting = False
-        self._wake.set()
-        self._overdue.end()
+        self._loop.end()
+        self._overdue.loop.end()
         self._follow_ups.end()
-        self._reserve_ready.set()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
-        if self._requests:
-            await asyncio.wait(self._requests)
-        if self._dispatching is not None:
-            await self._dispatching
+        for begun in (self._requests, self._loops[:1]):
+            if begun:
+                await asyncio.wait(begun)
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=grace_s)
-        for run in self._runs:
-            run.kill("stop")
+        for attempt in self.attempts:
+            attempt.kill("stop")
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
-        self._ended.set()
-        self._house.end()
-        for task in self._keeping:
-            await task
-        await self._peers.leave()
+        self._ended = True
+        self._maintenance.loop.end()
+        await asyncio.gather(*self._loops)
+        await self._peers.leave(self._writer)
         await self._executor.close()
         if self._reserve is not None:
             await self._reserve.close()
@@ -181,125 +150,157 @@ class Dispatcher:
             raise Draining
         if kind not in self._kinds:
             raise UnknownJobKind(kind)
-        admit = self._admit(self._kinds[kind], payload, time_limit_s, idempotency)
-        return await asyncio.shield(spawn(admit, self._requests))
+        insert = partial(
+            self._store.insert,
+            self._kinds[kind],
+            payload,
+            time_limit_s=time_limit_s,
+            idempotency=idempotency,
+            request_id=labels().get("request_id"),
+            key_id=labels().get("key_id"),
+        )
+        admit = self._admit(kind, self._kinds[kind].lane, insert)
+        return await asyncio.shield(_spawn(admit, self._requests))
 
     async def _admit(
-        self,
-        kind: JobKind,
-        payload: dict[str, Any],
-        time_limit_s: float | None,
-        idempotency: Idempotency | None,
+        self, kind: str, lane: Lane, insert: Callable[..., tuple[Claim, bool]]
     ) -> tuple[Job, bool]:
-        lane = kind.lane
-        if not self._runs and not any((*self._lanes.running.values(), *self._lanes.waiting.values())):
-            self._clock.follow()
-        run_now = self._lanes.is_first(lane) and self._lanes.may_start(lane, self._executor.ready)
-        places = self._max_queued[lane]
-        free_s = self._lanes.time_to_a_place(lane, self._runs.times(self._clock.now()))
-        limit = QueueLimit(places, free_s * random.uniform(1.0, _LATEST_RETURN))
-        asked_by = labels()
-        if run_now:
-            self._lanes.running[lane] += 1
+        running = self._capacity.running
+        idle = not self.attempts and not any(running.values())
+        reserved = self._capacity.may_start(lane, self._executor.ready)
+        free_s = self._capacity.time_to_a_place(lane, self.attempts.times(self._store.clock.now()))
+        limit = QueueLimit(self._limits.max_queued[lane], free_s * random.uniform(1.0, _LATEST_RETURN))
+        running[lane] += reserved
+        begins = False
         try:
-            claim, created = await self._writer.write(
-                self._store.insert,
-                kind,
-                payload,
-                run_now=run_now,
-                limit=limit,
-                time_limit_s=time_limit_s,
-                idempotency=idempotency,
-                request_id=asked_by.get("request_id"),
-                key_id=asked_by.get("key_id"),
-            )
-        except BaseException:
-            if run_now:
+            claim, created = await self._writer.write(insert, run_now=reserved, limit=limit, idle=idle)
+            begins = created and claim.job.status is JobStatus.RUNNING
+        finally:
+            if reserved and not begins:
                 self._give_back(lane)
-            raise
         if created:
-            _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind.name, "lane": lane})
-        if created and run_now:
+            _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind, "lane": lane})
+        if begins:
             self._begin(claim)
         elif created:
-            self._waiting.more(claim.job, claim.deadline)
-        elif run_now:
-            self._give_back(lane)
+            self.moved(claim.job, claim.deadline)
         return claim.job, created
 
     async def cancel(self, job_id: str) -> Job:
         """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""
-        if self._ended.is_set():
+        if self._ended:
             raise Draining
-        return await asyncio.shield(spawn(self._cancel(job_id), self._requests))
+        return await asyncio.shield(_spawn(self._cancel(job_id), self._requests))
 
     async def _cancel(self, job_id: str) -> Job:
         job, before = await self._writer.write(self._store.cancel, job_id)
         if not before.finished:
             _log.info("job cancelled", extra={"job_id": job_id, "was": before.value})
         if before is JobStatus.QUEUED:
-            self._waiting.less(job)
-            self._tell_end(job, None)
-        elif before is JobStatus.RUNNING and (run := self._runs.of(job_id)) is not None:
-            run.stop(self._grace_s)
+            self.moved(job)
+        elif before is JobStatus.RUNNING and (attempt := self.attempts.of(job_id)) is not None:
+            self.stop_attempt(attempt)
         elif before is JobStatus.RUNNING:
-            self._peers.tell_cancelled(job_id)
-        return self.newest(job)
+            self._peers.tell("cancelled", job_id)
+        return self.attempts.newest(job)
+
+    def runs(self, job_id: str) -> bool:
+        """Say whether a job runs here; its events then tell all that happens to it."""
+        return self.attempts.of(job_id) is not None
 
     def load(self) -> Load:
         """Return how busy the workers are."""
         return Load(
             capacity=self._executor.capacity,
             ready=self._executor.ready,
-            running=dict(self._lanes.running),
-            waiting=dict(self._lanes.waiting),
+            running=dict(self._capacity.running),
             restarts=self._executor.restarts + (0 if self._reserve is None else self._reserve.restarts),
         )
 
-    def runs(self, job_id: str) -> bool:
-        """Say whether a job runs here; its channel then tells all that happens to it."""
-        return self._runs.of(job_id) is not None
+    def moved(self, job: Job, deadline: float | None = None, ran_s: float | None = None) -> None:
+        """Take note of a job that waits or has ended, and did not before; tell everybody who is interested.
 
-    def newest(self, job: J) -> J:
-        """Return a job with the progress that is known here and not yet in the table."""
-        run = self._runs.of(job.id)
-        if run is None or job.status is not JobStatus.RUNNING:
-            return job
-        return replace(job, progress=run.progress)
+        Parameters
+        ----------
+        job
+            The job.
+        deadline
+            When its time is up, if it waits and that is known; by the service's clock.
+        ran_s
+            How long its last attempt took, if it has ended with one here.
+        """
+        if not job.status.finished:
+            kind = self._kinds.get(job.kind)
+            if deadline is not None and kind is not None and self._answers(kind):
+                self._overdue.watch(job.id, deadline, kind.effort(job.payload))
+            self._peers.tell("waiting", job.lane)
+            self._look_in(job.lane)
+            return
+        self._overdue.forget(job.id)
+        if (events := self.events.known(job.id)) is not None:
+            events.end(job)
+        self._peers.tell("ended", job.id)
+        if self._observer is not None:
+            self._observer.ended(job, ran_s)
+        about = {"job_id": job.id, "kind": job.kind, "status": job.status.value}
+        reason = None if job.error is None else job.error["code"]
+        took = None if ran_s is None else round(ran_s, 4)
+        _log.info("job ended", extra={**about, "reason": reason, "ran_s": took})
+
+    def stop_attempt(self, attempt: Attempt) -> None:
+        """Stop an attempt whose job is to be cancelled."""
+        attempt.stop(self._grace_s)
+
+    async def look(self) -> None:
+        """Look at all that waits in the table, whether something was told of it or not."""
+        waiting = await self._writer.write(self._store.waiting)
+        self._look_in(*(lane for lane, jobs in waiting.items() if jobs))
+        kinds = [kind.name for kind in self._kinds.values() if self._answers(kind)]
+        if kinds:
+            self._overdue.watch_only(await self._writer.write(self._store.deadlines, kinds))
+
+    def _look_in(self, *lanes: Lane) -> None:
+        self._capacity.hint(lanes)
+        self._loop.wake()
+
+    def _answers(self, kind: JobKind) -> bool:
+        """Say whether jobs of a kind are answered beside the workers when their time is up."""
+        return self._reserve is not None and kind.at_once is not None
+
+    def _hear(self, what: str, of: str) -> None:
+        """React to what another service told."""
+        match what:
+            case "waiting":
+                self._look_in(*(lane for lane in LANES if lane == of))
+            case "ended":
+                self._overdue.forget(of)
+                if (events := self.events.known(of)) is not None:
+                    events.notify()
+            case "cancelled" if (attempt := self.attempts.of(of)) is not None:
+                self.stop_attempt(attempt)
+            case "":
+                self._look_in(*LANES)
+                self.events.notify()
 
     async def _dispatch(self) -> None:
         """Give free workers to the jobs that wait."""
-        while self._accepting:
-            await self._wake.wait()
-            self._wake.clear()
-            while self._accepting and (lane := self._lanes.next_lane(self._executor.ready)) is not None:
-                self._lanes.running[lane] += 1
-                self._waiting.looks(lane)
-                try:
-                    claim = await self._writer.write(self._store.claim, lane)
-                except Exception:
-                    self._lanes.running[lane] -= 1
-                    _log.exception("no job could be taken from the queue; there will be another try")
-                    await asyncio.sleep(_PAUSE_S)
-                    continue
-                if claim is None:
-                    self._waiting.found_none(lane)
-                    self._lanes.running[lane] -= 1
-                else:
-                    self._waiting.less(claim.job)
-                    self._begin(claim)
+        while self._accepting and (lanes := self._capacity.begin_look(self._executor.ready)):
+            claim, more_wait = None, True
+            try:
+                claim = await self._writer.write(self._store.claim, lanes)
+                more_wait = claim is not None and claim.more_wait
+            finally:
+                self._capacity.end_look(None if claim is None else claim.job.lane)
+                self._capacity.hint(lanes if more_wait else ())
+            if claim is not None:
+                self._overdue.forget(claim.job.id)
+                self._begin(claim)
 
     async def _answer_at_once(self, job_ids: Sequence[str]) -> dict[str, float]:
         """Answer jobs whose time is up while they wait, beside the workers; return the seconds each took."""
-        # Taken before a process has started to answer it, it could be out of its grace by then.
-        while self._accepting and self._reserve is not None and self._reserve.ready == 0:
-            self._reserve_ready.clear()
-            await self._reserve_ready.wait()
         self._follow_ups.make_way()
         begun = time.monotonic()
         claims = await self._writer.write(self._store.claim_these, job_ids)
-        for claim in claims:
-            self._waiting.less(claim.job)
         # While one is brought onto the disk the next is being answered.
         tasks = [self._begin(claim, at_once=True) for claim in claims]
         if tasks:
@@ -311,91 +312,69 @@ class Dispatcher:
     def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.
 
-        So a cancellation, which is committed after it, finds it among the runs.
+        So a cancellation, which is committed after it, finds it among the attempts.
         """
-        job = claim.job
-        kind = self._kinds[job.kind]
+        job, kind, now = claim.job, self._kinds[claim.job.kind], self._store.clock.now()
         executor, work = self._executor, kind.work
         if at_once and self._reserve is not None and kind.at_once is not None:
             executor, work = self._reserve, kind.at_once
-        channel = self._channels.open(job.id)
-        now = self._clock.now()
-        run = Run(job, claim.deadline, channel, job.progress, now, time.monotonic(), at_once=at_once)
-        self._runs.add(run)
-
-        def on_progress(progress: Progress) -> None:
-            run.progress, run.unsaved = progress, True
-            if run.killed_for != "gone":
-                channel.report(progress)
-
-        if job.attempt == 1 and job.started_at is not None:
+        events = self.events.open(job.id)
+        attempt = Attempt(job, claim.deadline, events, job.progress, now, time.monotonic(), at_once=at_once)
+        self.attempts.add(attempt)
+        if self._observer is not None and job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
         left = None if claim.deadline is None else claim.deadline - now
-        loop = asyncio.get_running_loop()
-        run.execution = executor.submit(
-            work,
-            handed_over(job),
-            time_left_s=left,
-            on_progress=on_progress,
-            labels=job.labels,
+        attempt.execution = executor.submit(
+            work, attempt.payload, time_left_s=left, on_progress=attempt.report, labels=job.labels
         )
+        loop = asyncio.get_running_loop()
         if left is not None:
-            run.timers.append(loop.call_later(max(0.0, left) + self._grace_s, run.kill, "time"))
+            attempt.timers.append(loop.call_later(max(0.0, left) + self._grace_s, attempt.kill, "time"))
         if kind.max_run_s is not None:
-            run.timers.append(loop.call_later(kind.max_run_s, run.stop, self._grace_s, "time"))
-        return spawn(self._finish(run, run.execution), self._finishing)
+            attempt.timers.append(loop.call_later(kind.max_run_s, attempt.stop, self._grace_s, "time"))
+        return _spawn(self._finish(attempt, attempt.execution), self._finishing)
 
-    async def _finish(self, run: Run, execution: Execution) -> None:
-        """Wait for the outcome of a job and settle it; its worker stays reserved until that is on disk."""
-        bind_contextvars(**run.job.labels)
-        begun, took = time.monotonic(), None
+    async def _finish(self, attempt: Attempt, execution: Execution) -> None:
+        """Wait for the outcome of a job and store it; its worker stays reserved until that is on disk."""
+        bind_contextvars(**attempt.job.labels)
+        begun, took = time.monotonic(), 0.0
         job: Job | None = None
         try:
             outcome = await execution.outcome()
             took = time.monotonic() - begun
-            for timer in run.timers:
+            for timer in attempt.timers:
                 timer.cancel()
-            job = await self._settling.settle(run, outcome)
+            job = await complete(attempt, outcome, self._store, self._writer, self._grace_s)
         except Exception:
             _log.exception("a job's end could not be stored; once something can be, it is given back")
-            self._recovery.unsettled(run)
+            self._maintenance.unsettled.append(attempt)
         else:
             if job is None:
-                _log.warning("a job went on without attempt %d", run.job.attempt)
-            elif job.status is JobStatus.SUCCEEDED and not run.at_once:
-                self._lanes.ran(job.lane, [took])
+                _log.warning("a job went on without attempt %d", attempt.job.attempt)
+            elif job.status is JobStatus.SUCCEEDED and not attempt.at_once:
+                self._capacity.ran(job.lane, [took])
             if job is not None and job.unfinished:
-                self._follow_ups.more()
-        self._runs.remove(run)
-        if job is not None and job.status.finished:
-            self._tell_end(job, took)
-        else:
-            if job is not None:
-                self._waiting.more(job, run.deadline)
+                self._follow_ups.loop.wake()
+        self.attempts.remove(attempt)
+        if job is not None:
+            self.moved(job, attempt.deadline, took)
+        if job is None or not job.status.finished:
             # It goes on later, or elsewhere: who listens has to look there.
-            run.channel.ring()
-        if not run.at_once:
-            self._give_back(run.job.lane)
-
-    def _tell_end(self, job: Job, ran_s: float | None) -> None:
-        """Tell everybody who is interested that a job has ended."""
-        self._channels.end(job)
-        self._peers.tell_ended(job.id)
-        self._observer.ended(job, ran_s)
-        _log.info(
-            "job ended",
-            extra={
-                "job_id": job.id,
-                "kind": job.kind,
-                "status": job.status.value,
-                "reason": None if job.error is None else job.error["code"],
-                "ran_s": None if ran_s is None else round(ran_s, 4),
-            },
-        )
+            attempt.events.notify()
+        if not attempt.at_once:
+            self._give_back(attempt.job.lane)
 
     def _has_spare(self) -> bool:
-        return not self._overdue.busy and sum(self._lanes.running.values()) < self._executor.capacity
+        return not self._overdue.busy and sum(self._capacity.running.values()) < self._executor.capacity
 
     def _give_back(self, lane: Lane) -> None:
-        self._lanes.running[lane] -= 1
-        self._wake.set()
+        self._capacity.running[lane] -= 1
+        self._loop.wake()
+
+
+def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:
+    """Run a coroutine that goes on if its caller is cancelled; ``among`` keeps it from being collected."""
+    task = asyncio.create_task(work)
+    among.add(task)
+    task.add_done_callback(among.discard)
+    return task

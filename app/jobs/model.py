@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from datetime import datetime
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -162,7 +162,7 @@ class Load:
         Jobs that can run at a time when all workers are well.
     ready
         Workers that are warm now; the service answers quickly once there is one.
-    running, waiting
+    running
         Jobs by lane.
     restarts
         Workers that were replaced since the start because they died or were killed.
@@ -171,7 +171,6 @@ class Load:
     capacity: int
     ready: int
     running: dict[Lane, int]
-    waiting: dict[Lane, int]
     restarts: int
 
 
@@ -300,3 +299,21 @@ class JobKind:
     max_run_s: float | None = None
     effort: Callable[[Mapping[str, Any]], float] = _the_least
     follow_up: FollowUp | None = None
+
+
+class JobObserver(Protocol):
+    """Told of jobs on the event loop; it must be quick and must not raise."""
+
+    def started(self, job: Job, waited_s: float) -> None:
+        """Take note of a job's first attempt, and how long it waited for it in seconds."""
+
+    def ended(self, job: Job, ran_s: float | None) -> None:
+        """Take note of a job's end.
+
+        Parameters
+        ----------
+        job
+            Succeeded, failed or cancelled.
+        ran_s
+            How long its last attempt took in seconds; None if it ended without one in this process.
+        """

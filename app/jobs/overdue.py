@@ -6,8 +6,6 @@ together. How long one takes is measured with each.
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import math
 import time
 from collections import deque
@@ -15,7 +13,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from statistics import median_high
 from typing import NamedTuple
 
-from app.jobs.channel import rung
+from app.jobs.clock import Loop
 
 _REMEMBERED = 16
 _UNMEASURED_S = 0.02
@@ -29,9 +27,6 @@ _LARGEST_GROUP, _LONGEST_GROUP_S = 16, 0.25
 """Jobs that are taken out of the queue at once, and how long they may take together."""
 
 _LONGEST_LOOK_S = 60.0
-_PAUSE_S = 0.1
-
-_log = logging.getLogger(__name__)
 
 
 class Wait(NamedTuple):
@@ -82,19 +77,26 @@ class OverdueJobs:
         Answers those jobs, of some, that still wait, and returns how many seconds each took.
     now
         The clock that deadlines are by.
+    ready
+        Says whether there is what answers them: one that is taken before could be out of its grace by then.
+
+    Attributes
+    ----------
+    loop
+        Does it; to be woken when ``ready`` may have changed.
     """
 
     def __init__(
         self,
         answer: Callable[[Sequence[str]], Awaitable[Mapping[str, float]]],
         now: Callable[[], float] = time.time,
+        ready: Callable[[], bool] = lambda: True,
     ) -> None:
-        self._answer, self._now = answer, now
+        self._answer, self._now, self._ready = answer, now, ready
         self._waits: dict[str, Wait] = {}
         self._pace = Pace()
-        self._changed = asyncio.Event()
         self._answering = False
-        self._ended = False
+        self.loop = Loop(self._answer_due, "jobs whose time is up could not be answered")
 
     @property
     def busy(self) -> bool:
@@ -104,7 +106,7 @@ class OverdueJobs:
     def watch(self, job_id: str, deadline: float, effort: float = 1.0) -> None:
         """Take note of a job that waits, when its time is up, and how much there is to do for it."""
         self._waits[job_id] = Wait(deadline, effort)
-        self._changed.set()
+        self.loop.wake()
 
     def watch_only(self, deadlines: Mapping[str, float]) -> None:
         """Take note of all the jobs that wait, by their id, and of no others."""
@@ -113,40 +115,30 @@ class OverdueJobs:
             job_id: known.get(job_id, Wait(deadline))._replace(deadline=deadline)
             for job_id, deadline in deadlines.items()
         }
-        self._changed.set()
+        self.loop.wake()
 
     def forget(self, job_id: str) -> None:
         """Take note that a job waits no more."""
         self._waits.pop(job_id, None)
 
-    def end(self) -> None:
-        """Make :meth:`keep` return after what it is at."""
-        self._ended = True
-        self._changed.set()
-
-    async def keep(self) -> None:
-        """Answer the jobs whose time has come, until the end."""
-        while not self._ended:
-            self._changed.clear()
-            if not self._waits:
-                await self._changed.wait()
-                continue
+    async def _answer_due(self) -> float | None:
+        """Answer the jobs whose time has come; return how long there is nothing to do."""
+        while self._waits and self._ready() and not self.loop.ended:
             now = self._now()
             in_s = latest_start(self._waits.values(), self._pace) - now
             if in_s > 0:
-                await rung(self._changed, min(in_s, _LONGEST_LOOK_S))
-                continue
+                return min(in_s, _LONGEST_LOOK_S)
             group = {job_id: self._waits.pop(job_id) for job_id in due(self._waits, self._pace, now)}
             self._answering = True
             try:
                 for job_id, seconds in (await self._answer(tuple(group))).items():
                     self._pace.took(group[job_id].effort, seconds)
             except Exception:
-                _log.exception("jobs whose time is up could not be answered; there will be another try")
                 self._waits = {**group, **self._waits}
-                await asyncio.sleep(_PAUSE_S)
+                raise
             finally:
                 self._answering = False
+        return None
 
 
 def latest_start(waits: Iterable[Wait], pace: Pace) -> float:

@@ -1,67 +1,45 @@
-"""Whether other services work on the same job table, and what a dispatcher then has to do with them.
+"""The other services on a job table: each shows that it lives, and they tell each other what happens.
 
-On SQLite a service has :class:`NoPeers`; on a shared database it has those of
-:class:`app.jobs.shared.Shared`.
+On SQLite a service has :class:`NoPeers`. On PostgreSQL what is told is only a hint to look, and may get lost:
+waiting jobs and dead owners are looked for once a lease, cancellations with every heartbeat, and those who
+wait for a job look at the table now and then.
+
+An owner that was not seen for a lease, by the database's clock, is dead, and its jobs are given back. If it
+lives on after all (it was suspended, or cut off), nothing is finished twice: its attempts are outdated from
+then on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
-from typing import Protocol
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable
+from typing import Literal, NamedTuple
 
-from app.jobs.model import Lane
-from app.jobs.run import Run
+import sqlalchemy as sa
 
+from app.jobs.attempts import Writer
+from app.jobs.model import JobStatus
+from app.jobs.queries import Announcements, Database
+from app.jobs.tables import DATABASE_NOW, jobs, owners
 
-@dataclass(frozen=True, slots=True)
-class Reactions:
-    """What the dispatcher does when something is heard.
+_CHANNEL = "allocator_jobs"
+_BEATS_A_LEASE = 5
+_FORGOTTEN_LEASES = 1000
 
-    Attributes
-    ----------
-    look_for_work
-        A job waits in a lane.
-    forget
-        A job has ended elsewhere, by its id.
-    stop
-        A job that runs here should stop.
-    give_back
-        The table has a job, in this attempt, as one that runs here, but it does not.
-    look_after
-        It is time to look for jobs that nobody runs.
-    """
+News = Literal["waiting", "ended", "cancelled"]
+"""A job waits, in a lane; a job has ended; a job, which another service runs, should stop."""
 
-    look_for_work: Callable[[Lane], None]
-    forget: Callable[[str], None]
-    stop: Callable[[Run], None]
-    give_back: Callable[[str, int], Awaitable[None]]
-    look_after: Callable[[], Awaitable[None]]
+Hear = Callable[[str, str], None]
+"""Gets what is heard and of which lane or job; two empty strings where something may have been missed."""
 
 
-class Peers(Protocol):
-    """The other services, as the dispatcher deals with them; called on the event loop where not said."""
+class OwnedJob(NamedTuple):
+    """A job that this service runs, as the table has it."""
 
-    others_may_wait: bool
-    """Whether there may be waiting jobs that this service has not heard of."""
-
-    async def join(self, reactions: Reactions) -> None:
-        """Begin, before the first job is taken, and react from then on to what is heard."""
-
-    async def leave(self) -> None:
-        """End, after the last job was settled or put back."""
-
-    def is_alive(self, owner: str) -> bool:
-        """Say whether an owner can still finish its jobs. Blocks; called in the thread that writes."""
-
-    def tell_waiting(self, lane: Lane) -> None:
-        """Tell that a job waits in a lane."""
-
-    def tell_ended(self, job_id: str) -> None:
-        """Tell that a job has ended."""
-
-    def tell_cancelled(self, job_id: str) -> None:
-        """Tell that a job, which runs elsewhere, should stop."""
+    attempt: int
+    cancel_requested: bool
 
 
 class NoPeers:
@@ -71,28 +49,121 @@ class NoPeers:
     ----------
     owner
         This service.
+
+    Attributes
+    ----------
+    lease_s
+        How long after it was seen last an owner counts as alive, in seconds.
+    beat_s
+        Seconds between two heartbeats.
     """
 
-    others_may_wait = False
+    lease_s = beat_s = float("inf")
 
     def __init__(self, owner: str) -> None:
         self._owner = owner
 
-    async def join(self, reactions: Reactions) -> None:
-        """Do nothing: nothing is ever heard."""
+    async def join(self, writer: Writer, hear: Hear) -> None:
+        """Begin, before the first job is taken; ``hear`` is called on the event loop with what is told."""
 
-    async def leave(self) -> None:
-        """Do nothing."""
+    async def leave(self, writer: Writer) -> None:
+        """End, after the last job was settled or put back."""
+
+    def beat(self) -> dict[str, OwnedJob]:
+        """Show that this service lives, and return the jobs that the table says it runs. Blocks."""
+        return {}
 
     def is_alive(self, owner: str) -> bool:
-        """Say whether it is this service: every other one has ended, or the database would be occupied."""
+        """Say whether an owner can still finish its jobs. Blocks.
+
+        Every other one has ended, or the database would be occupied.
+        """
         return owner == self._owner
 
-    def tell_waiting(self, lane: Lane) -> None:
-        """Tell nobody."""
+    def tell(self, what: News, of: str) -> None:
+        """Tell the others."""
 
-    def tell_ended(self, job_id: str) -> None:
-        """Tell nobody."""
 
-    def tell_cancelled(self, job_id: str) -> None:
-        """Tell nobody."""
+class PostgresPeers(NoPeers):
+    """The services that share a PostgreSQL database with this one.
+
+    Parameters
+    ----------
+    database
+        The database.
+    owner, lease_s
+        This service, and its lease.
+    clock
+        Seconds that pass here, by which this owner knows for how long it could not show itself.
+    """
+
+    def __init__(
+        self, database: Database, owner: str, lease_s: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        super().__init__(owner)
+        self._database, self._clock = database, clock
+        self.lease_s, self.beat_s = lease_s, lease_s / _BEATS_A_LEASE
+        self._announcements: Announcements | None = None
+        self._beaten = float("-inf")
+        self._judges_from = float("inf")
+
+    async def join(self, writer: Writer, hear: Hear) -> None:
+        """Show this service among the living, and begin to listen."""
+        await writer.write_with_retry(self.beat)
+        loop = asyncio.get_running_loop()
+
+        def heard(message: str | None) -> None:
+            what, _, of = (message or "").partition(" ")
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(hear, what, of)
+
+        self._announcements = await asyncio.to_thread(self._database.announcements, _CHANNEL, heard)
+
+    async def leave(self, writer: Writer) -> None:
+        """Say nothing any more, and be forgotten."""
+        if self._announcements is not None:
+            await asyncio.to_thread(self._announcements.close)
+        with contextlib.suppress(Exception):  # a server that is gone: the others will see that this one is
+            await writer.write(self.forget)
+
+    def beat(self) -> dict[str, OwnedJob]:
+        """Show that this service lives, and return the jobs that the table says it runs, by their id.
+
+        After a time in which it could not, the others could not either: nobody is judged until all who live
+        have had the time of a lease to show themselves.
+        """
+        begun = self._clock()
+        me, mine = owners.c.owner == self._owner, jobs.c.owner == self._owner
+        running = sa.select(jobs.c.id, jobs.c.attempt, jobs.c.cancel_requested)
+        with self._database.write() as connection:
+            if not connection.execute(sa.update(owners).where(me).values(seen_at=DATABASE_NOW)).rowcount:
+                connection.execute(sa.insert(owners).values(owner=self._owner, seen_at=DATABASE_NOW))
+            rows = connection.execute(running.where(mine, jobs.c.status == JobStatus.RUNNING)).all()
+        if begun - self._beaten > self.lease_s / 2:
+            self._judges_from = begun + self.lease_s
+        self._beaten = begun
+        return {job_id: OwnedJob(attempt, cancel_requested) for job_id, attempt, cancel_requested in rows}
+
+    def is_alive(self, owner: str) -> bool:
+        """Say whether an owner was seen within the lease; yes as long as this one must not judge."""
+        if owner == self._owner or self._clock() < self._judges_from:
+            return True
+        with self._database.read() as connection:
+            age = connection.scalar(sa.select(DATABASE_NOW - owners.c.seen_at).where(owners.c.owner == owner))
+        return age is not None and age <= self.lease_s
+
+    def forget(self) -> None:
+        """Remove this owner, and those that died so long ago that no job can be theirs."""
+        forgotten = owners.c.seen_at < DATABASE_NOW - _FORGOTTEN_LEASES * self.lease_s
+        with self._database.write() as connection:
+            connection.execute(sa.delete(owners).where(sa.or_(owners.c.owner == self._owner, forgotten)))
+
+    def tell(self, what: News, of: str) -> None:
+        """Tell the others."""
+        if self._announcements is not None:
+            self._announcements.tell(f"{what} {of}")
+
+
+def peers_on(database: Database, owner: str, lease_s: float) -> NoPeers:
+    """Return whom an owner shares a database with: nobody, or others."""
+    return PostgresPeers(database, owner, lease_s) if database.shared else NoPeers(owner)

@@ -4,7 +4,8 @@ The cluster keeps nothing that must last: the job table does. A worker that dies
 loses the attempt that it was at, as a worker of this machine does, and its slot gets a new one as soon as the
 cluster has a place for it.
 
-Ray is an extra: nothing imports it before an executor starts.
+Ray is an extra: nothing imports it before an executor starts. On the cluster's side nothing here imports
+SQLAlchemy, numpy, numba or torch: what the work needs comes with the work function.
 """
 
 from __future__ import annotations
@@ -23,13 +24,16 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from app.jobs.executor import Lost, Outcome, Raised
-from app.jobs.failure import describe
-from app.jobs.local import KEEPS_MEMORY, SINGLE_THREADED
+from app.jobs import worker
+from app.jobs.errors import describe
+from app.jobs.executor import Executor, Lost, Outcome, Raised, Work
 from app.jobs.model import Progress
-from app.jobs.ray_worker import REPORT_INTERVAL_S, RayWorker
-from app.jobs.slots import SlotExecution, SlotExecutor
-from app.jobs.worker import Ended
+from app.jobs.work_context import WorkContext
+from app.jobs.worker import Ended, clean
+from app.logs import configure_worker_logs
+
+REPORT_INTERVAL_S = 0.5
+"""Between two progresses of a job; each is a call over the network."""
 
 OWN_CLUSTER = "local"
 """An address for which a cluster is started on this machine, and ended with the executor."""
@@ -43,7 +47,7 @@ _TALKERS = 4
 _serials = itertools.count(1)
 
 
-class RayExecutor(SlotExecutor["_Worker"]):
+class RayExecutor(Executor):
     """Runs work in actors of a Ray cluster.
 
     Parameters
@@ -56,12 +60,8 @@ class RayExecutor(SlotExecutor["_Worker"]):
     resources
         What a worker needs of its machine, by the names of Ray; other names than ``CPU`` and ``GPU`` are of
         labels that machines were started with.
-    warm_up, warm_up_arguments
-        ``"module:function"`` and its arguments, called in every worker before it gets work.
-    environment
-        Variables of the workers.
-    log_level
-        What the workers log at least, to the files of the cluster's machines; None leaves Python's own way.
+    options
+        As :class:`app.jobs.executor.Executor` takes them. The log goes to files of the cluster's machines.
     """
 
     def __init__(
@@ -70,17 +70,10 @@ class RayExecutor(SlotExecutor["_Worker"]):
         *,
         address: str = OWN_CLUSTER,
         resources: Mapping[str, float] = MappingProxyType({"CPU": 1.0}),
-        warm_up: str | None = None,
-        warm_up_arguments: tuple[Any, ...] = (),
-        environment: Mapping[str, str] = MappingProxyType(SINGLE_THREADED | KEEPS_MEMORY),
-        log_level: str | None = None,
+        **options: Any,
     ) -> None:
-        super().__init__(slots)
-        self._address = address
-        self._resources = dict(resources)
-        self._warm_up = warm_up, *warm_up_arguments
-        self._environment = dict(environment)
-        self._log_level = log_level
+        super().__init__(slots, **options)
+        self._address, self._resources = address, dict(resources)
         self._ray: ModuleType | None = None
         self._connected_here = False
 
@@ -99,21 +92,6 @@ class RayExecutor(SlotExecutor["_Worker"]):
             self._ray = self._connect()
         await super().start(on_ready)
 
-    def submit(
-        self,
-        work: str,
-        payload: Mapping[str, Any],
-        *,
-        time_left_s: float | None,
-        on_progress: Callable[[Progress], None],
-        labels: Mapping[str, str] = MappingProxyType({}),
-    ) -> _RayExecution:
-        """Hand work to the next free worker, see :meth:`app.jobs.executor.Executor.submit`."""
-        deadline = None if time_left_s is None else time.monotonic() + time_left_s
-        execution = _RayExecution(self._free, work, payload, deadline, on_progress, dict(labels))
-        self._keep(execution)
-        return execution
-
     async def close(self) -> None:
         """Kill all workers; work that was not awaited is lost."""
         await super().close()
@@ -128,7 +106,7 @@ class RayExecutor(SlotExecutor["_Worker"]):
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError("Ray is not installed: pip install 'uav-allocator[ray]'") from error
         if not ray.is_initialized():
-            cpus = math.ceil(self._slots * self._resources.get("CPU", 0.0))
+            cpus = math.ceil(self.capacity * self._resources.get("CPU", 0.0))
             own: dict[str, Any] = (
                 {"num_cpus": cpus, "include_dashboard": False} if self._address == OWN_CLUSTER else {}
             )
@@ -138,7 +116,15 @@ class RayExecutor(SlotExecutor["_Worker"]):
 
     def _new_worker(self) -> _Worker:
         assert self._ray is not None
-        return _Worker(self._ray, self._resources, self._environment, self._log_level, self._warm_up)
+        others = {name: amount for name, amount in self._resources.items() if name not in ("CPU", "GPU")}
+        actor = self._ray.remote(concurrency_groups={_TALK: _TALKERS})(RayWorker).options(
+            num_cpus=self._resources.get("CPU", 0),
+            num_gpus=self._resources.get("GPU", 0),
+            resources=others,
+            max_restarts=0,
+            runtime_env={"env_vars": self._environment},
+        )
+        return _Worker(self._ray, actor.remote(self._log_level), self._warm_up)
 
 
 @contextlib.contextmanager
@@ -158,27 +144,12 @@ def _kept_signals() -> Iterator[None]:
 class _Worker:
     """A worker actor as the executor sees it."""
 
-    def __init__(
-        self,
-        ray: ModuleType,
-        resources: Mapping[str, float],
-        environment: Mapping[str, str],
-        log_level: str | None,
-        warm_up: tuple[Any, ...],
-    ) -> None:
-        others = {name: amount for name, amount in resources.items() if name not in ("CPU", "GPU")}
-        self._ray = ray
-        actor = ray.remote(concurrency_groups={_TALK: _TALKERS})(RayWorker)
-        self._actor = actor.options(
-            num_cpus=resources.get("CPU", 0),
-            num_gpus=resources.get("GPU", 0),
-            resources=others,
-            max_restarts=0,
-            runtime_env={"env_vars": dict(environment)},
-        ).remote(log_level)
-        self.name: str = self._actor._actor_id.hex()[:12]
+    def __init__(self, ray: ModuleType, actor: Any, warm_up: tuple[Any, ...]) -> None:
+        self._ray, self._actor, self._warm_up = ray, actor, warm_up
+        self.name: str = actor._actor_id.hex()[:12]
         self.gone = False
-        self._warm_up = warm_up
+        self._serial = 0
+        self._newest: Progress | None = None
 
     async def warm_up(self) -> None:
         await self._actor.warm_up.remote(*self._warm_up)
@@ -188,25 +159,46 @@ class _Worker:
         with contextlib.suppress(self._ray.exceptions.RayError):
             await self._actor.stay.options(concurrency_group=_TALK).remote()
 
-    async def run(self, *arguments: Any) -> Ended | Lost:
-        try:
-            ended: Ended = await self._actor.run.remote(*arguments)
-        except self._ray.exceptions.RayTaskError:
-            raise  # what came back could not be sent; the worker lives
-        except self._ray.exceptions.RayError as error:
-            return Lost(f"worker {self.name} is gone: {type(error).__name__}")
-        return ended
-
-    async def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
-        try:
-            call = self._actor.progress_after.options(concurrency_group=_TALK)
-            newest: tuple[int, Progress] | None = await call.remote(serial, count)
-        except self._ray.exceptions.RayError:
+    async def run(self, work: Work, cancelled: bool) -> Outcome | None:
+        """Do one piece of work; None if the actor was gone before."""
+        if self.gone:
             return None
-        return newest
+        self._serial, self._newest = next(_serials), None
+        left = None if math.isinf(work.deadline) else work.deadline - time.monotonic()
+        listening = asyncio.create_task(self._listen(self._serial, work.on_progress))
+        call = work.labels, work.function, work.payload
+        try:
+            ended: Ended = await self._actor.run.remote(self._serial, *call, left, cancelled)
+        except Exception as error:
+            errors = self._ray.exceptions
+            if isinstance(error, errors.RayError) and not isinstance(error, errors.RayTaskError):
+                self.gone = True
+                return Lost(f"worker {self.name} is gone: {type(error).__name__}")
+            # What was to be sent, or what came back, cannot be pickled; the worker is well.
+            return Raised(describe(error), traceback.format_exc())
+        finally:
+            listening.cancel()
+        if ended.progress is not None and ended.progress != self._newest:
+            work.on_progress(ended.progress)
+        return ended.outcome
 
-    def cancel(self, serial: int) -> None:
-        self._actor.cancel.options(concurrency_group=_TALK).remote(serial)
+    async def _listen(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
+        """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
+        count = 0
+        await asyncio.sleep(_UNHEARD_S)
+        with contextlib.suppress(self._ray.exceptions.RayError):
+            call = self._actor.progress_after.options(concurrency_group=_TALK)
+            while (news := await call.remote(serial, count)) is not None:
+                count, self._newest = news
+                on_progress(news[1])
+                await asyncio.sleep(REPORT_INTERVAL_S)
+
+    def cancel(self) -> None:
+        """Raise the flag that the work polls."""
+        self._actor.cancel.options(concurrency_group=_TALK).remote(self._serial)
+
+    def share(self, workers: float) -> None:
+        """Do nothing: what is idle may be on another machine."""
 
     def kill(self) -> None:
         with contextlib.suppress(Exception):  # it is gone, and maybe the cluster too
@@ -217,59 +209,97 @@ class _Worker:
         self.kill()
 
 
-class _RayExecution(SlotExecution[_Worker]):
-    """One piece of work, from waiting for a worker to its outcome."""
+class RayWorker:
+    """A worker of the cluster.
 
-    def __init__(
+    The work runs in one thread, calls about it in others; what they share is guarded by a condition.
+
+    Parameters
+    ----------
+    log_level
+        What is logged at least; None: as Python does it by itself.
+    """
+
+    def __init__(self, log_level: str | None) -> None:
+        if log_level is not None:
+            configure_worker_logs(log_level)
+        self._changed = threading.Condition()
+        self._serial = 0
+        self._context = WorkContext.in_process(lambda _progress: None)
+        self._latest: Progress | None = None
+        self._count = 0
+        self._cancelled = 0
+
+    def warm_up(self, *arguments: Any) -> None:
+        """Make the first piece of work as quick as the later ones."""
+        worker.warm_up(*arguments)
+
+    def stay(self) -> None:
+        """Never return: whoever waits for it learns that this process has died."""
+        threading.Event().wait()
+
+    def run(
         self,
-        free: asyncio.Queue[_Worker],
+        serial: int,
+        labels: dict[str, str],
         work: str,
         payload: Mapping[str, Any],
-        deadline: float | None,
-        on_progress: Callable[[Progress], None],
-        labels: dict[str, str],
-    ) -> None:
-        self._call = labels, work, payload
-        self._deadline = deadline
-        self._on_progress = on_progress
-        self._newest: Progress | None = None
-        self._serial = next(_serials)
-        super().__init__(free)
+        time_left_s: float | None,
+        cancelled: bool,
+    ) -> Ended:
+        """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
 
-    def cancel(self) -> None:
-        """Raise the flag that the work polls."""
-        self._cancelled = True
-        if self._worker is not None:
-            self._worker.cancel(self._serial)
+        Parameters
+        ----------
+        serial
+            Tells this work from others in calls about it; it grows.
+        labels
+            What the lines have that are logged meanwhile.
+        work, payload
+            ``"module:function"`` and what it gets.
+        time_left_s
+            Counted from now, so that the clocks of machines need not agree.
+        cancelled
+            Whether it was to stop before it was sent: calls about it may come here after it has begun.
+        """
 
-    async def _run(self) -> Outcome:
-        slot = await self._free.get()
-        while slot.gone:
-            slot = await self._free.get()
-        self._worker = slot
-        left = None if self._deadline is None else self._deadline - time.monotonic()
-        listening = asyncio.create_task(self._listen(slot))
-        try:
-            ended = await slot.run(self._serial, *self._call, left, self._cancelled)
-        except Exception as error:
-            # What was to be sent, or what came, cannot be pickled; the worker is well.
-            ended = Ended(Raised(describe(error), traceback.format_exc()), None)
-        finally:
-            listening.cancel()
-            self._worker = None
-        if isinstance(ended, Lost):
-            slot.gone = True
-            return ended
-        if ended.progress is not None and ended.progress != self._newest:
-            self._on_progress(ended.progress)
-        self._free.put_nowait(slot)
-        return ended.outcome
+        def report(progress: Progress) -> None:
+            with self._changed:
+                self._latest = progress
+                self._count += 1
+                self._changed.notify_all()
 
-    async def _listen(self, slot: _Worker) -> None:
-        """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
-        count = 0
-        await asyncio.sleep(_UNHEARD_S)
-        while (news := await slot.progress_after(self._serial, count)) is not None:
-            count, self._newest = news
-            self._on_progress(self._newest)
-            await asyncio.sleep(REPORT_INTERVAL_S)
+        context = WorkContext.in_process(report, time_left_s)
+        with self._changed:
+            self._serial, self._context, self._latest, self._count = serial, context, None, 0
+            if cancelled or self._cancelled == serial:
+                context.cancel()
+        outcome = worker.perform(labels, work, payload, context)
+        with self._changed:
+            last = self._latest
+            self._serial, self._latest = -serial, None
+            self._changed.notify_all()
+        return Ended(outcome, None if last is None else clean(last))
+
+    def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
+        """Wait until the work has reported more than ``count`` times; None once it has ended.
+
+        It may be called before the work has come here.
+        """
+
+        def has_news() -> bool:
+            ended = self._serial == -serial or abs(self._serial) > serial
+            return ended or (self._serial == serial and self._count > count)
+
+        with self._changed:
+            self._changed.wait_for(has_news)
+            if self._serial != serial or self._latest is None:
+                return None
+            return self._count, clean(self._latest)
+
+    def cancel(self, serial: int) -> None:
+        """Ask the work to stop; also if it has been sent and not begun."""
+        with self._changed:
+            self._cancelled = serial
+            if self._serial == serial:
+                self._context.cancel()

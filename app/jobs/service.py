@@ -9,26 +9,24 @@ from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapp
 from dataclasses import replace
 from typing import Any
 
-from app.jobs.channel import Channels, rung
-from app.jobs.clock import Clock
-from app.jobs.dispatcher import Dispatcher
+from app.jobs.clock import Clock, wait_for
+from app.jobs.dispatcher import Dispatcher, Limits
 from app.jobs.executor import Executor
-from app.jobs.listening import Listening
 from app.jobs.model import (
     LANES,
     Idempotency,
     Job,
     JobEvent,
     JobKind,
+    JobObserver,
     JobPage,
     JobStatus,
     JobSummary,
     Lane,
     Load,
 )
-from app.jobs.observer import JobObserver, NoObserver
 from app.jobs.owner import new_owner
-from app.jobs.reading import Database
+from app.jobs.queries import Database
 from app.jobs.store import JobStore
 
 # A waiter may miss the news of a job that another process runs, and looks at the table.
@@ -85,29 +83,15 @@ class JobService:
         observer: JobObserver | None = None,
         lease_s: float = 15.0,
     ) -> None:
-        owner = new_owner()
-        dropped_fields = {kind.name: kind.dropped_fields for kind in kinds}
-        self._database = database
-        self._store = JobStore(database, owner, max_attempts, dropped_fields, Clock())
-        self._channels = Channels()
-        # Where nobody else can change a job, nothing happens to it that its channel does not tell.
+        places = dict.fromkeys(LANES, max_queued if isinstance(max_queued, int) else _PLACES)
+        places = places if isinstance(max_queued, int) else {**places, **max_queued}
+        limits = Limits(places, overrun_grace_s, retention_s, lease_s)
+        self._store = JobStore(database, new_owner(), max_attempts, kinds, Clock())
+        self._dispatcher = Dispatcher(self._store, executor, reserve, observer, limits)
+        self._database, self._attempts = database, self._dispatcher.attempts
+        self._events, self._runs = self._dispatcher.events, self._dispatcher.runs
+        # Where nobody else can change a job, nothing happens to it that its events do not tell.
         self._look_again_s = _LOOK_AGAIN_S if database.shared else None
-        self._dispatcher = Dispatcher(
-            self._store,
-            owner,
-            kinds,
-            executor,
-            reserve,
-            self._channels,
-            max_queued=dict.fromkeys(LANES, max_queued)
-            if isinstance(max_queued, int)
-            else {**dict.fromkeys(LANES, _PLACES), **max_queued},
-            overrun_grace_s=overrun_grace_s,
-            retention_s=retention_s,
-            observer=observer or NoObserver(),
-            lease_s=lease_s,
-        )
-        self._listening = Listening(self._store, self._dispatcher, self._channels)
         self._stopping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -136,7 +120,7 @@ class JobService:
         """
         if self._stopping is None:
             self._stopping = asyncio.create_task(self._stop(grace_s))
-            self._listening.end()
+            self._events.stop()
 
     async def stop(self, grace_s: float) -> None:
         """Stop as :meth:`begin_stop` does, unless that was called, and wait until that is done."""
@@ -147,7 +131,7 @@ class JobService:
     async def _stop(self, grace_s: float) -> None:
         await self._dispatcher.stop(grace_s)
         self._database.vacate()
-        self._channels.ring()
+        self._events.notify()
 
     async def submit(
         self,
@@ -197,7 +181,7 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
-        return self._dispatcher.newest(await asyncio.to_thread(self._store.get, job_id))
+        return self._attempts.newest(await asyncio.to_thread(self._store.get, job_id))
 
     async def look(self, job_id: str) -> JobSummary:
         """Return a job with its newest progress, without its payload and result.
@@ -207,11 +191,9 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
-        self._channels.follow(job_id)
-        return await self._look(job_id)
-
-    async def _look(self, job_id: str) -> JobSummary:
-        return self._dispatcher.newest(await asyncio.to_thread(self._store.look, job_id))
+        if (events := self._events.known(job_id)) is not None:
+            events.followed = True
+        return self._attempts.newest(await asyncio.to_thread(self._store.look, job_id))
 
     async def result_text(self, job_id: str) -> str | None:
         """Return a job's result as JSON, as it is stored; None without one."""
@@ -233,7 +215,7 @@ class JobService:
             If no page gave out such a cursor.
         """
         page = await asyncio.to_thread(self._store.page, limit, cursor, status)
-        newest = (self._dispatcher.newest(job) for job in page.jobs)
+        newest = (self._attempts.newest(job) for job in page.jobs)
         plain = (replace(job, progress=replace(job.progress, assignment=None)) for job in newest)
         return replace(page, jobs=tuple(plain))
 
@@ -264,7 +246,7 @@ class JobService:
 
     async def abandon(self, job_id: str) -> None:
         """Cancel a job whose client has gone, unless somebody else has asked for it or the service stops."""
-        if self._stopping is None and not self._channels.open(job_id).followed:
+        if self._stopping is None and not self._events.open(job_id).followed:
             _log.info("the client of a job has gone", extra={"job_id": job_id})
             await self.cancel(job_id)
 
@@ -282,21 +264,20 @@ class JobService:
             If no job has that id.
         """
         end = None if timeout_s is None else time.monotonic() + timeout_s
-        channel = self._channels.open(job_id)
+        events = self._events.open(job_id)
         while True:
-            bell = channel.changed
-            if not channel.over.is_set() and not self._dispatcher.runs(job_id):
-                summary = await self._look(job_id)
-                if summary.status.finished:
-                    return await self.get(job_id)
-            if channel.over.is_set():
-                return channel.ended or await self.get(job_id)
+            changed = events.changed
+            elsewhere = not events.over.is_set() and not self._runs(job_id)
+            if elsewhere and (await asyncio.to_thread(self._store.look, job_id)).status.finished:
+                return await self.get(job_id)
+            if events.over.is_set():
+                return events.ended or await self.get(job_id)
             left = None if end is None else end - time.monotonic()
-            in_vain = self._stopping is not None and not self._dispatcher.runs(job_id)
+            in_vain = self._stopping is not None and not self._runs(job_id)
             if in_vain or (left is not None and left <= 0):
                 return await self.get(job_id)
             pauses = [seconds for seconds in (left, self._look_again_s) if seconds is not None]
-            await rung(bell, min(pauses, default=None))
+            await wait_for(changed, min(pauses, default=None))
 
     async def wait_for_client(
         self, job_id: str, timeout_s: float | None, gone: Coroutine[Any, Any, object]
@@ -315,7 +296,7 @@ class JobService:
         Job or None
             None: the client has gone, and the job is cancelled unless somebody else has asked for it.
         """
-        channel = self._channels.open(job_id)  # open until here is known who else has asked
+        events = self._events.open(job_id)  # open until here is known who else has asked
         waiting, leaving = asyncio.create_task(self.wait(job_id, timeout_s)), asyncio.create_task(gone)
         try:
             await asyncio.wait((waiting, leaving), return_when=asyncio.FIRST_COMPLETED)
@@ -326,18 +307,22 @@ class JobService:
         finally:
             waiting.cancel()
             leaving.cancel()
-            del channel
+            del events
 
     def events(
         self, job_id: str, after: int = 0, allowed: Callable[[], Awaitable[bool]] | None = None
     ) -> AsyncGenerator[JobEvent]:
-        """Listen to a job, see :meth:`app.jobs.listening.Listening.events`."""
-        return self._listening.events(job_id, after, allowed)
+        """Listen to a job, see :meth:`app.jobs.events.EventStreams.listen`."""
+        return self._events.listen(job_id, after, allowed)
 
     def has_told_all(self, job: JobSummary, after: int) -> bool:
         """Say whether a job has ended, and ``after`` is the id of its last event."""
-        return self._listening.has_told_all(job, after)
+        return self._events.has_told_all(job, after)
 
     def load(self) -> Load:
         """Return how busy the service is; it answers quickly once a worker is ready."""
         return self._dispatcher.load()
+
+    def waiting(self) -> dict[Lane, int]:
+        """Return how many jobs wait in each lane; blocks, as the table says it."""
+        return self._store.waiting()

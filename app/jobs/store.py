@@ -1,7 +1,7 @@
 """The job table: every state a job takes is one transaction here, and nothing else knows the truth.
 
 Taking in and taking out come first, then the ways in which an attempt ends, then what is done to jobs from
-outside; what only looks at the table is in :mod:`app.jobs.reading`.
+outside; what only looks at the table is in :mod:`app.jobs.queries`.
 
 A transition out of ``running`` names the attempt it belongs to and touches nothing if the job has gone on
 without it: a worker that was given up on cannot overwrite what came after it.
@@ -13,55 +13,41 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
+from app.jobs import queries
+from app.jobs.capacity import QueueLimit
 from app.jobs.clock import Clock
-from app.jobs.errors import IdempotencyMismatch, QueueFull
-from app.jobs.failure import failure
-from app.jobs.lanes import QueueLimit
-from app.jobs.model import (
-    FINISHED,
-    FollowUp,
-    Idempotency,
-    Job,
-    JobKind,
-    JobStatus,
-    Lane,
-    Progress,
-    WorkResult,
-)
-from app.jobs.reading import Database, JobReader
+from app.jobs.errors import IdempotencyMismatch, QueueFull, failure
+from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
+from app.jobs.queries import Claim, Database, JobQueries
+from app.jobs.stored_json import read_later
 from app.jobs.tables import artifacts, idempotency_keys, jobs
-from app.jobs.transitions import (
-    Claim,
-    claim_of,
-    end,
-    find,
-    find_attempt,
-    job_of,
-    progress_columns,
-    progress_of,
-    queued_of_other_kinds,
-    requeue,
-    select_jobs,
-    select_jobs_to_change,
-    take,
-)
-from app.jobs.unfinished import UnfinishedResults, has_place
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
-OnSuccess = Callable[[Connection, Job, WorkResult], Mapping[str, Any]]
+_QUEUED, _RUNNING = jobs.c.status == JobStatus.QUEUED, jobs.c.status == JobStatus.RUNNING
+# Of each lane the job that has waited longest; one that another dispatcher is about to take is passed over,
+# where they do not take turns.
+_OLDEST = {
+    lane: sa.select(jobs.c.number)
+    .where(_QUEUED, jobs.c.lane == lane)
+    .order_by(jobs.c.number)
+    .limit(1)
+    .with_for_update(skip_locked=True)
+    .scalar_subquery()
+    for lane in LANES
+}
 
 
-class JobStore(JobReader):
+class JobStore(JobQueries):
     """Reads and writes the job table on behalf of one owner.
 
     Parameters
@@ -72,15 +58,15 @@ class JobStore(JobReader):
         Recorded with every job that is taken, see :mod:`app.jobs.owner`.
     max_attempts
         How often a job may be lost with its worker or its owner; then it fails.
-    dropped_fields
-        By kind of job, the fields of the payload that go when it ends.
+    kinds
+        The kinds of job that there are.
     clock
         Of the service; None: a new one.
 
     Attributes
     ----------
-    unfinished
-        The results that are completed after their job's end.
+    kinds
+        By their names.
     """
 
     def __init__(
@@ -88,18 +74,16 @@ class JobStore(JobReader):
         database: Database,
         owner: str,
         max_attempts: int,
-        dropped_fields: Mapping[str, frozenset[str]] = MappingProxyType({}),
+        kinds: Iterable[JobKind] = (),
         clock: Clock | None = None,
     ) -> None:
         super().__init__(database, clock or Clock())
-        self._owner = owner
-        self._max_attempts = max_attempts
-        self._dropped_fields = dropped_fields
-        self.unfinished = UnfinishedResults(self, owner, max_attempts)
+        self.owner, self.max_attempts = owner, max_attempts
+        self.kinds = {kind.name: kind for kind in kinds}
 
     def migrate(self) -> None:
         """Make the tables, or bring them to this version."""
-        self._database.migrate(MIGRATIONS, VERSION_TABLE)
+        self.database.migrate(MIGRATIONS, VERSION_TABLE)
 
     def insert(
         self,
@@ -108,6 +92,7 @@ class JobStore(JobReader):
         *,
         run_now: bool,
         limit: QueueLimit,
+        idle: bool = False,
         time_limit_s: float | None = None,
         idempotency: Idempotency | None = None,
         request_id: str | None = None,
@@ -118,7 +103,12 @@ class JobStore(JobReader):
         Parameters
         ----------
         run_now
-            A worker is reserved: the job begins as running, which saves the transaction that takes it.
+            A worker is reserved: the job begins as running, which saves the transaction that takes it, unless
+            another waits that comes before it.
+        limit
+            Of the queue, where it has to wait.
+        idle
+            Nothing runs here: where nothing waits either, the clock takes over the system's time.
         request_id, key_id
             The request that asks for it, and its API key.
 
@@ -134,219 +124,220 @@ class JobStore(JobReader):
         QueueFull
             If the job would have to wait and its lane has no place left.
         """
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             if idempotency is not None:
-                self._database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
+                self.database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
                 known = self._known(connection, idempotency)
                 if known is not None:
                     return known, False
+            nothing_waits = idle and not self._waits(connection, LANES)
+            if nothing_waits:
+                self.clock.follow()
+            elif run_now:
+                run_now = not self._waits(connection, LANES[: LANES.index(kind.lane) + 1])
             if not run_now:
-                self._database.take_turn(connection, f"queue {kind.lane}")
-                waiting = connection.scalar(
-                    sa.select(sa.func.count()).where(
-                        jobs.c.status == JobStatus.QUEUED, jobs.c.lane == kind.lane
-                    )
-                )
-                if (waiting or 0) >= limit.places:
+                self.database.take_turn(connection, f"queue {kind.lane}")
+                if queries.waiting_in(connection, kind.lane) >= limit.places:
                     raise QueueFull(kind.lane, limit.places, limit.retry_after_s)
-            now = self._now(connection)
+            now, ahead = self._times(connection)
             row: dict[str, Any] = {
+                **dict.fromkeys(jobs.c.keys()[1:]),
+                **queries.progress_columns(Progress()),
                 "id": uuid.uuid4().hex,
                 "kind": kind.name,
                 "lane": kind.lane,
                 "status": JobStatus.RUNNING if run_now else JobStatus.QUEUED,
                 "payload": payload,
-                "result": None,
-                "error": None,
-                **progress_columns(Progress()),
-                "attempt": 1 if run_now else 0,
+                "attempt": int(run_now),
                 "losses": 0,
-                "owner": self._owner if run_now else None,
+                "owner": self.owner if run_now else None,
                 "cancel_requested": False,
                 "deadline": None if time_limit_s is None else now + time_limit_s,
                 "created_at": now,
                 "started_at": now if run_now else None,
-                "finished_at": None,
                 "request_id": request_id,
                 "key_id": key_id,
-                "unfinished": None,
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
-                connection.execute(
-                    sa.insert(idempotency_keys).values(
-                        client=idempotency.client,
-                        key=idempotency.key,
-                        body_hash=idempotency.body_hash,
-                        job_id=row["id"],
-                    )
-                )
-            ahead = self._ahead(connection)
-        return claim_of(row, ahead), True
+                key = sa.insert(idempotency_keys).values(**asdict(idempotency), job_id=row["id"])
+                connection.execute(key)
+        return queries.claim_of(row, ahead), True
+
+    def _waits(self, connection: Connection, lanes: Iterable[Lane]) -> bool:
+        """Say whether a job waits in one of the lanes."""
+        return connection.scalar(_one_in(tuple(lanes))) is not None
 
     def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
+        of_client = idempotency_keys.c.client == idempotency.client
         found = connection.execute(
-            sa.select(idempotency_keys.c.body_hash, idempotency_keys.c.job_id).where(
-                idempotency_keys.c.client == idempotency.client, idempotency_keys.c.key == idempotency.key
-            )
+            sa.select(idempotency_keys).where(of_client, idempotency_keys.c.key == idempotency.key)
         ).first()
         if found is None:
             return None
         if found.body_hash != idempotency.body_hash:
             raise IdempotencyMismatch(idempotency.key, found.job_id)
-        row = connection.execute(select_jobs.where(jobs.c.id == found.job_id)).mappings().one()
-        return claim_of(row, self._ahead(connection))
+        row = queries.find(connection, found.job_id, queries.select_jobs)
+        return queries.claim_of(row, self._times(connection)[1])
 
-    def claim(self, lane: Lane) -> Claim | None:
-        """Take the job of a lane that has waited longest; None if none waits."""
-        oldest = (
-            sa.select(jobs.c.number)
-            .where(jobs.c.status == JobStatus.QUEUED, jobs.c.lane == lane)
-            .order_by(jobs.c.number)
-            .limit(1)
-            # One that another dispatcher is about to take is passed over, where they do not take turns.
-            .with_for_update(skip_locked=True)
-            .scalar_subquery()
-        )
-        return next(iter(self._take(jobs.c.number == oldest)), None)
+    def claim(self, lanes: Sequence[Lane]) -> Claim | None:
+        """Take the job that has waited longest in the first of the lanes that has one; None if none has."""
+        first = sa.func.coalesce(*(_OLDEST[lane] for lane in lanes), sa.null())
+        return next(iter(self._take(jobs.c.number == first, lanes)), None)
 
     def claim_these(self, job_ids: Sequence[str]) -> list[Claim]:
         """Take jobs out of their turn; those that wait, in the order of their deadlines."""
         claims = self._take(jobs.c.id.in_(job_ids))
         return sorted(claims, key=lambda claim: claim.deadline or 0.0)
 
-    def _take(self, which: sa.ColumnElement[bool]) -> list[Claim]:
-        with self._database.write() as connection:
-            now = self._now(connection)
-            rows = connection.execute(take(which, self._owner, now)).mappings().all()
-            ahead = self._ahead(connection)
-        return [claim_of(row, ahead) for row in rows]
+    def _take(self, which: sa.ColumnElement[bool], lanes: Sequence[Lane] = ()) -> list[Claim]:
+        with self.database.write() as connection:
+            now, ahead = self._times(connection)
+            # An earlier process may have had another idea of the time.
+            started_at = sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now)
+            begins = {"status": JobStatus.RUNNING, "attempt": jobs.c.attempt + 1, "owner": self.owner}
+            take = sa.update(jobs).where(which, _QUEUED).values(**begins, started_at=started_at)
+            rows = connection.execute(take.returning(*queries.whole)).mappings().all()
+            if not rows:
+                connection.rollback()  # nothing is there to be committed
+                return []
+            more_wait = bool(lanes) and self._waits(connection, lanes)
+        return [queries.claim_of(row, ahead, more_wait) for row in rows]
 
-    def succeed(
-        self,
-        job_id: str,
-        attempt: int,
-        work: WorkResult,
-        progress: Progress,
-        on_success: OnSuccess | None,
-        follow_up: FollowUp | None = None,
-    ) -> Job | None:
+    def succeed(self, job_id: str, attempt: int, work: WorkResult, progress: Progress) -> Job | None:
         """Store what the work returned; the job has succeeded, or is cancelled if that was asked for.
 
         Returns
         -------
         Job or None
-            None if the job has gone on without this attempt: nothing was stored, ``on_success`` not called.
+            None if the job has gone on without this attempt: nothing was stored, and the
+            ``on_success`` of its kind not called.
         """
-        with self._database.write() as connection:
-            row = find_attempt(connection, job_id, attempt)
+        with self.database.write() as connection:
+            row = self._find_attempt(connection, job_id, attempt)
             if row is None:
                 return None
-            cancelled = row["cancel_requested"]
-            result = work.result
-            if on_success is not None and not cancelled:
-                result = on_success(connection, job_of(row), work)
+            kind, cancelled = self.kinds[row["kind"]], row["cancel_requested"]
+            result, unfinished = work.result, False
+            if kind.on_success is not None and not cancelled:
+                result = kind.on_success(connection, queries.job_of(row), work)
             if work.artifact is not None:
                 connection.execute(sa.insert(artifacts).values(job_id=job_id, data=work.artifact))
-            unfinished = False
-            if work.unfinished and follow_up is not None:
-                unfinished = not cancelled and has_place(connection)
-                result = result if unfinished else {**result, **follow_up.given_up}
-            if cancelled:
-                return self._end(connection, row, JobStatus.CANCELLED, progress, result=result)
-            done = replace(progress, fraction=1.0)
-            return self._end(connection, row, JobStatus.SUCCEEDED, done, result=result, unfinished=unfinished)
+            if work.unfinished and kind.follow_up is not None:
+                unfinished = not cancelled and queries.has_place(connection)
+                result = result if unfinished else {**result, **kind.follow_up.given_up}
+            done = progress if cancelled else replace(progress, fraction=1.0)
+            tries = 0 if unfinished else None
+            return self._move(connection, row, JobStatus.SUCCEEDED, done, result=result, unfinished=tries)
 
     def fail(self, job_id: str, attempt: int, error: dict[str, Any], progress: Progress) -> Job | None:
         """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
-        with self._database.write() as connection:
-            row = find_attempt(connection, job_id, attempt)
-            if row is None:
-                return None
-            status = JobStatus.CANCELLED if row["cancel_requested"] else JobStatus.FAILED
-            return self._end(connection, row, status, progress, error=error)
+        return self._end_attempt(job_id, attempt, JobStatus.FAILED, progress, error=error)
 
-    def lose(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
-        """Give a job back whose worker died: it waits again, or has failed if that was the last attempt.
+    def requeue(self, job_id: str, attempt: int, progress: Progress | None) -> Job | None:
+        """Put a job back into the queue that was stopped through no fault of its own.
+
+        Without a progress it keeps the one that is stored. A job that was to be cancelled is cancelled. None
+        if the job has gone on without this attempt.
+        """
+        return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress)
+
+    def mark_crashed(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
+        """Put a job back whose worker died: it waits again, or has failed if that was the last attempt.
 
         A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
         """
-        with self._database.write() as connection:
-            row = find_attempt(connection, job_id, attempt)
-            return None if row is None else self._lose(connection, row, reason, progress)
+        return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress, crash=reason)
 
-    def release(self, job_id: str, attempt: int, progress: Progress | None) -> Job | None:
-        """Put a job back into the queue that was stopped through no fault of its own.
+    def _end_attempt(
+        self, job_id: str, attempt: int, status: JobStatus, progress: Progress | None, **values: Any
+    ) -> Job | None:
+        with self.database.write() as connection:
+            row = self._find_attempt(connection, job_id, attempt)
+            return None if row is None else self._move(connection, row, status, progress, **values)
 
-        Without a progress it keeps the one that is stored.
-        """
-        with self._database.write() as connection:
-            row = find_attempt(connection, job_id, attempt)
-            if row is None:
-                return None
-            if progress is None:
-                progress = progress_of(row)
-            if row["cancel_requested"]:
-                return self._end(connection, row, JobStatus.CANCELLED, progress)
-            return requeue(connection, row, row["losses"], progress)
+    def _find_attempt(self, connection: Connection, job_id: str, attempt: int) -> RowMapping | None:
+        """Return the row if the job is still in this attempt; nothing can come between it and the commit."""
+        of_attempt = jobs.c.id == job_id, jobs.c.attempt == attempt, _RUNNING
+        return connection.execute(queries.select_to_change.where(*of_attempt)).mappings().first()
 
-    def _lose(self, connection: Connection, row: RowMapping, reason: str, progress: Progress) -> Job:
-        if row["cancel_requested"]:
-            return self._end(connection, row, JobStatus.CANCELLED, progress)
-        losses = row["losses"] + 1
-        if losses >= self._max_attempts:
-            error = failure("worker-lost", f"{reason}; given up after {losses} attempts")
-            return self._end(connection, row, JobStatus.FAILED, progress, error=error)
-        return requeue(connection, row, losses, progress)
-
-    def _end(
-        self, connection: Connection, row: RowMapping, status: JobStatus, progress: Progress, **values: Any
+    def _move(
+        self,
+        connection: Connection,
+        row: RowMapping,
+        status: JobStatus,
+        progress: Progress | None = None,
+        crash: str | None = None,
+        **values: Any,
     ) -> Job:
-        dropped = self._dropped_fields.get(row["kind"], frozenset())
-        return end(connection, row, status, progress, self._now(connection), dropped=dropped, **values)
+        """Move a job on from the state, and the attempt, in which it was read: cancelled if it was to be.
 
-    def recover(self, kinds: Iterable[str], alive: Callable[[str], bool]) -> list[Job]:
-        """Give back the running jobs of owners that are dead, and fail jobs of kinds that are no more.
+        Parameters
+        ----------
+        progress
+            None: the one that is stored.
+        crash
+            Why its worker or its owner is gone, for which it fails after the last attempt.
+        values
+            Of other columns.
+        """
+        if row["cancel_requested"]:
+            status = JobStatus.CANCELLED
+        elif crash is not None:
+            values["losses"] = crashes = row["losses"] + 1
+            if crashes >= self.max_attempts:
+                status = JobStatus.FAILED
+                values["error"] = failure("worker-lost", f"{crash}; given up after {crashes} attempts")
+        if status.finished:
+            # An earlier process may have had another idea of the time.
+            values["finished_at"] = max(self._times(connection)[0], row["started_at"] or row["created_at"])
+            kind = self.kinds.get(row["kind"])
+            if kind is not None and kind.dropped_fields:
+                payload = read_later(row["payload"]).items()
+                values["payload"] = {name: it for name, it in payload if name not in kind.dropped_fields}
+        else:
+            # It waits in the place of the queue that its number gives it.
+            values.update(owner=None, started_at=None)
+        progress = queries.progress_of(row) if progress is None else progress
+        stored = {"status": status, **queries.progress_columns(progress), **values}
+        as_read = jobs.c.id == row["id"], jobs.c.attempt == row["attempt"], jobs.c.status == row["status"]
+        # Not all of it is read again: payload and result are known here, and may be large.
+        change = sa.update(jobs).where(*as_read).values(stored).returning(queries.has_artifact)
+        return queries.job_of({**row, **stored, **connection.execute(change).mappings().one()})
+
+    def recover(self, alive: Callable[[str], bool]) -> list[Job]:
+        """Put back the running jobs of owners that are dead, and fail jobs of kinds that are no more.
 
         Returns
         -------
         list of Job
             Every job that was changed.
         """
-        changed = []
-        with self._database.read() as connection:
-            owners = connection.scalars(
-                sa.select(jobs.c.owner).where(jobs.c.status == JobStatus.RUNNING).distinct()
-            ).all()
-            strangers = connection.scalar(queued_of_other_kinds(kinds).with_only_columns(sa.func.count()))
+        stranger = _QUEUED, jobs.c.kind.not_in(list(self.kinds))
+        with self.database.read() as connection:
+            owners = connection.scalars(sa.select(jobs.c.owner).where(_RUNNING).distinct()).all()
+            strangers = connection.scalar(sa.select(sa.func.count()).where(*stranger))
         dead = [owner for owner in owners if not alive(owner)]
+        changed: list[Job] = []
         if not dead and not strangers:
-            return []
-        with self._database.write() as connection:
-            lost = select_jobs_to_change.where(jobs.c.status == JobStatus.RUNNING, jobs.c.owner.in_(dead))
-            for row in connection.execute(lost).mappings().all():
-                changed.append(
-                    self._lose(connection, row, "the service stopped in its midst", progress_of(row))
-                )
-            unknown = queued_of_other_kinds(kinds).with_for_update(of=jobs)
-            for row in connection.execute(unknown).mappings().all():
+            return changed
+        with self.database.write() as connection:
+            left = queries.select_to_change.where(_RUNNING, jobs.c.owner.in_(dead))
+            for row in connection.execute(left).mappings().all():
+                reason = "the service stopped in its midst"
+                changed.append(self._move(connection, row, JobStatus.QUEUED, crash=reason))
+            for row in connection.execute(queries.select_to_change.where(*stranger)).mappings().all():
                 error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
-                changed.append(self._end(connection, row, JobStatus.FAILED, progress_of(row), error=error))
+                changed.append(self._move(connection, row, JobStatus.FAILED, error=error))
         return changed
 
     def save_progress(self, items: Iterable[tuple[str, int, Progress]]) -> None:
         """Store the newest progress of running jobs, given as id, attempt and progress."""
-        with self._database.write() as connection:
+        with self.database.write() as connection:
             for job_id, attempt, progress in items:
-                connection.execute(
-                    sa.update(jobs)
-                    .where(
-                        jobs.c.id == job_id,
-                        jobs.c.attempt == attempt,
-                        jobs.c.status == JobStatus.RUNNING,
-                    )
-                    .values(progress_columns(progress))
-                )
+                of_attempt = jobs.c.id == job_id, jobs.c.attempt == attempt, _RUNNING
+                values = queries.progress_columns(progress)
+                connection.execute(sa.update(jobs).where(*of_attempt).values(values))
 
     def cancel(self, job_id: str) -> tuple[Job, JobStatus]:
         """Cancel a waiting job, note for a running one that it should stop, and leave a finished one alone.
@@ -361,16 +352,16 @@ class JobStore(JobReader):
         JobNotFound
             If no job has that id.
         """
-        with self._database.write() as connection:
-            row = find(connection, job_id, to_change=True)
-            if row["status"] == JobStatus.QUEUED:
-                return self._end(connection, row, JobStatus.CANCELLED, progress_of(row)), JobStatus.QUEUED
-            if row["status"] == JobStatus.RUNNING:
+        with self.database.write() as connection:
+            row = queries.find(connection, job_id, queries.select_to_change)
+            before = JobStatus(row["status"])
+            if before is JobStatus.QUEUED:
+                return self._move(connection, row, JobStatus.CANCELLED), before
+            if before is JobStatus.RUNNING:
                 connection.execute(
                     sa.update(jobs).where(jobs.c.number == row["number"]).values(cancel_requested=True)
                 )
-            job = job_of(row)
-        return job, job.status
+            return queries.job_of(row), before
 
     def expire(self, before: float, limit: int) -> int:
         """Delete finished jobs with what they left and the idempotency keys they came with.
@@ -387,12 +378,14 @@ class JobStore(JobReader):
         int
             How many were deleted.
         """
-        oldest = (
-            sa.select(jobs.c.number)
-            .where(jobs.c.finished_at < before)
-            .order_by(jobs.c.finished_at)
-            .limit(limit)
-        )
-        with self._database.write() as connection:
-            ended = jobs.c.number.in_(oldest), jobs.c.status.in_(FINISHED)
-            return connection.execute(sa.delete(jobs).where(*ended)).rowcount
+        old = sa.select(jobs.c.number).where(jobs.c.finished_at < before)
+        oldest = jobs.c.number.in_(old.order_by(jobs.c.finished_at).limit(limit))
+        with self.database.write() as connection:
+            return connection.execute(sa.delete(jobs).where(oldest, jobs.c.status.in_(FINISHED))).rowcount
+
+
+@cache
+def _one_in(lanes: tuple[Lane, ...]) -> sa.Select[int]:
+    """Select something if a job waits in one of the lanes."""
+    in_one = sa.or_(*(jobs.c.lane == lane for lane in lanes))
+    return sa.select(sa.literal(1)).where(_QUEUED, in_one).limit(1)

@@ -55,6 +55,10 @@ class WorkContext:
         """Tell how far the work is; may be called as often as there is news."""
         self._report(progress)
 
+    def cancel(self) -> None:
+        """Ask the work to stop."""
+        self._control[CANCEL] = 1.0
+
     def cancelled(self) -> bool:
         """Say whether somebody asked the work to stop."""
         return self._control[CANCEL] != 0.0

@@ -20,8 +20,8 @@ from functools import cache
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from app.jobs.errors import describe
 from app.jobs.executor import Raised, Returned
-from app.jobs.failure import describe
 from app.jobs.model import Progress
 from app.jobs.stored_json import written
 from app.jobs.work_context import WorkContext
@@ -99,14 +99,8 @@ def clean(progress: Progress) -> Progress:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Equipment:
-    reporter: _Reporter
-    control: MutableSequence[float]
-
-
 # A pool's initializer can hand over to its calls only through the module; a worker has exactly one.
-_equipment: list[_Equipment] = []
+_equipment: list[tuple[_Reporter, MutableSequence[float]]] = []
 
 
 def initialize(pipe: Connection, control: MutableSequence[float], log_level: str | None = None) -> None:
@@ -125,7 +119,7 @@ def initialize(pipe: Connection, control: MutableSequence[float], log_level: str
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, name="parent-watch", daemon=True).start()
-    _equipment.append(_Equipment(_Reporter(pipe), control))
+    _equipment.append((_Reporter(pipe), control))
 
 
 def _die_with_parent() -> None:
@@ -172,17 +166,23 @@ def run(labels: dict[str, str], work: str, payload: Mapping[str, Any], serial: i
     serial
         Tells the progress of this work from that of others.
     """
-    reporter, control = _equipment[0].reporter, _equipment[0].control
+    reporter, control = _equipment[0]
     reporter.begin(serial)
-    outcome: Returned | Raised
+    outcome = perform(labels, work, payload, WorkContext(reporter.report, control))
+    return Ended(outcome, reporter.end())
+
+
+def perform(
+    labels: dict[str, str], work: str, payload: Mapping[str, Any], context: WorkContext
+) -> Returned | Raised:
+    """Call a work function, see :func:`run`, and return what came of it."""
     try:
         with labelled(labels):
-            result = resolve(work)(payload, WorkContext(reporter.report, control))
+            result = resolve(work)(payload, context)
         # A result that is no JSON must fail here, with a traceback, and not when it is stored.
-        outcome = Returned(replace(result, result=written(result.result)))
+        return Returned(replace(result, result=written(result.result)))
     except BaseException as error:
-        outcome = Raised(describe(error), traceback.format_exc())
-    return Ended(outcome, reporter.end())
+        return Raised(describe(error), traceback.format_exc())
 
 
 @cache

@@ -16,11 +16,12 @@ from app.api.batch import Batches
 from app.api.job_kinds import BATCH
 from app.api.metrics import Metrics
 from app.api.services import Services
-from app.jobs import listening
+from app.jobs import events
+from app.jobs.capacity import QueueLimit
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobKind
 from app.jobs.service import JobService
-from app.jobs.store import JobStore, QueueLimit
+from app.jobs.store import JobStore
 from app.settings import Settings
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
@@ -202,7 +203,7 @@ def test_the_first_key_closes_a_running_service_and_revoking_it_does_not_open_it
 
 def test_a_stream_that_goes_on_ends_when_its_key_is_revoked(keys, start, monkeypatch):
     monkeypatch.setattr(guard, "_REMEMBERED_S", 0.0)
-    monkeypatch.setattr(listening, "_ASK_AGAIN_S", 0.01)
+    monkeypatch.setattr(events, "_ASK_AGAIN_S", 0.01)
     key, token = keys.create("dispatch", Role.ALLOCATE)
     service = start()
     services = service.app.state.services
@@ -215,7 +216,7 @@ def test_a_stream_that_goes_on_ends_when_its_key_is_revoked(keys, start, monkeyp
         transport = httpx.ASGITransport(service.app)
         async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
             listening_to = asyncio.create_task(client.get(path, headers=bearer(token)))
-            while not services.jobs._listening._listeners:
+            while not services.jobs._events.listeners:
                 await asyncio.sleep(0.001)
             assert await asyncio.to_thread(keys.revoke, key.id)
             return await asyncio.wait_for(listening_to, 60)

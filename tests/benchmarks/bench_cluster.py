@@ -34,8 +34,8 @@ from ray_nodes import RayNodes  # noqa: E402
 
 from app.domain.records import problem_to_record  # noqa: E402
 from app.jobs import stored_json  # noqa: E402
-from app.jobs.executor import Executor  # noqa: E402
-from app.jobs.local import SINGLE_THREADED, LocalExecutor  # noqa: E402
+from app.jobs.executor import SINGLE_THREADED, Executor  # noqa: E402
+from app.jobs.local import LocalExecutor  # noqa: E402
 from app.jobs.model import Job, JobKind, JobStatus  # noqa: E402
 from app.jobs.ray_cluster import RayExecutor  # noqa: E402
 from app.jobs.service import JobService  # noqa: E402

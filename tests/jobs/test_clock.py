@@ -1,4 +1,4 @@
-"""Limits and durations while the system's clock is set back and forward."""
+"""Limits and durations while the system's clock is set, and what is done again and again."""
 
 import asyncio
 import time
@@ -7,7 +7,7 @@ import pytest
 from harness import KINDS, finished, reports, running
 
 from app.jobs import service
-from app.jobs.clock import Clock
+from app.jobs.clock import Clock, Loop
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobKind, JobStatus
 
@@ -25,6 +25,23 @@ def test_time_passes_evenly_until_the_systems_is_taken_over():
     assert clock.now() == 400.0
     steady[0] += 1.0
     assert clock.now() == 401.0
+
+
+def test_a_loop_that_is_woken_while_it_works_works_once_more_and_outlives_a_failure():
+    steps = []
+
+    async def step():
+        steps.append(len(steps))
+        if len(steps) == 1:
+            loop.wake()
+        elif len(steps) == 2:
+            raise OSError("not now")
+        else:
+            loop.end()
+
+    loop = Loop(step, "a step failed")
+    asyncio.run(loop.run())
+    assert steps == [0, 1, 2]
 
 
 @pytest.fixture

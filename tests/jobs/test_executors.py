@@ -11,8 +11,8 @@ import pytest
 from harness import KINDS, database_of, eventually, finished, running, url_of
 from ray_nodes import RayNodes, ray_is_installed
 
-from app.jobs.executor import Lost, Raised, Returned
-from app.jobs.local import SINGLE_THREADED, LocalExecutor
+from app.jobs.executor import SINGLE_THREADED, Lost, Raised, Returned
+from app.jobs.local import LocalExecutor
 from app.jobs.model import JobStatus, Progress
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService

@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from harness import KINDS, database_of, eventually, finished, running
 
+from app.jobs.capacity import QueueLimit
+from app.jobs.follow_up import UnfinishedResults
 from app.jobs.local import LocalExecutor
 from app.jobs.model import FollowUp, JobKind, JobStatus, Progress, WorkResult
-from app.jobs.store import JobStore, QueueLimit
+from app.jobs.store import JobStore
 
 GIVEN_UP = {"rest": "never"}
 OTHER_HALF = FollowUp("job_work:other_half", GIVEN_UP)
@@ -96,23 +98,23 @@ def test_it_makes_way_for_an_answer_and_is_begun_anew(tmp_path):
     asyncio.run(scenario())
 
 
+TABLED = JobKind("later", "nowhere:later", "interactive", follow_up=OTHER_HALF)
+
+
 @pytest.fixture
 def table(any_database_url):
     database = database_of(any_database_url)
-    store = JobStore(database, "host:1:1:me", 3)
+    store = JobStore(database, "host:1:1:me", 3, [TABLED])
     store.migrate()
-    yield store, store.unfinished
+    yield store, UnfinishedResults(store)
     database.dispose()
 
 
 def ended(store, *, cancel=False, unfinished=True):
-    kind = JobKind("later", "nowhere:later", "interactive")
-    claim, _ = store.insert(kind, {}, run_now=True, limit=QueueLimit(1, 1.0))
+    claim, _ = store.insert(TABLED, {}, run_now=True, limit=QueueLimit(1, 1.0))
     if cancel:
         store.cancel(claim.job.id)
-    return store.succeed(
-        claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress(), None, OTHER_HALF
-    )
+    return store.succeed(claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress())
 
 
 def test_only_results_that_wait_for_it_are_completed(table):
@@ -161,7 +163,7 @@ def test_those_that_failed_come_last_and_then_no_more(table):
 
 def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
     store, results = table
-    monkeypatch.setattr("app.jobs.unfinished._MOST", 2)
+    monkeypatch.setattr("app.jobs.queries._MOST_UNFINISHED", 2)
     first, second, third = ended(store), ended(store), ended(store)
     assert [each.unfinished for each in (first, second, third)] == [True, True, False]
     assert third.result == HALF | GIVEN_UP
@@ -171,12 +173,12 @@ def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
 
 def test_services_that_share_a_database_complete_their_own_first(postgresql, monkeypatch):
     database = database_of(postgresql.new_database())
-    store = JobStore(database, "host:1:1:me", 3)
+    store = JobStore(database, "host:1:1:me", 3, [TABLED])
     store.migrate()
     job = ended(store)
-    other = JobStore(database, "host:2:2:other", 3).unfinished
+    other = UnfinishedResults(JobStore(database, "host:2:2:other", 3))
     assert other.next() is None
-    assert store.unfinished.next().id == job.id
-    monkeypatch.setattr("app.jobs.unfinished._LEFT_ALONE_S", 0.0)
+    assert UnfinishedResults(store).next().id == job.id
+    monkeypatch.setattr("app.jobs.follow_up._LEFT_ALONE_S", 0.0)
     assert other.next().id == job.id
     database.dispose()

@@ -9,8 +9,8 @@ import pytest
 from harness import PATIENCE_S, eventually, finished, reports, running
 
 from app.api.routes import jobs as routes
-from app.jobs import listening, service
-from app.jobs.channel import Channel, end_event
+from app.jobs import events, service
+from app.jobs.events import JobEvents, end_event
 from app.jobs.model import Job, JobStatus, Progress
 
 ENDED_AT = datetime(2026, 1, 1, tzinfo=UTC)
@@ -95,7 +95,7 @@ def test_streams_that_are_left_leave_no_task_and_no_reads(tmp_path, monkeypatch)
             (tmp_path / "gate").touch()
             for job in (runs, waits):
                 await finished(jobs, job)
-            assert jobs._listening._listeners == 0
+            assert jobs._events.listeners == 0
             # The one who waited for it looked once before it ran.
             assert reads["look"] <= 2
 
@@ -107,15 +107,15 @@ def test_on_sqlite_who_waits_and_who_listens_look_once_and_are_told_the_rest(tmp
         async with running(tmp_path) as jobs:
             patience = []
 
-            async def noted(bell, timeout_s):
+            async def noted(changed, timeout_s):
                 patience.append(timeout_s)
-                await bell.wait()
+                await changed.wait()
 
             gate = {"path": str(tmp_path / "gate")}
             await jobs.submit("until_file", gate)
             waits, _ = await jobs.submit("until_file", gate)
-            monkeypatch.setattr(service, "rung", noted)
-            monkeypatch.setattr(listening, "rung", noted)
+            monkeypatch.setattr(service, "wait_for", noted)
+            monkeypatch.setattr(events, "wait_for", noted)
             reads = count_reads(monkeypatch, jobs)
             waiting = asyncio.create_task(jobs.wait(waits.id, None))
 
@@ -134,7 +134,7 @@ def test_on_sqlite_who_waits_and_who_listens_look_once_and_are_told_the_rest(tmp
 
 
 def test_a_stream_ends_when_its_listener_may_not_have_it_any_more(tmp_path, monkeypatch):
-    monkeypatch.setattr(listening, "_ASK_AGAIN_S", 0.01)
+    monkeypatch.setattr(events, "_ASK_AGAIN_S", 0.01)
 
     async def scenario():
         async with running(tmp_path) as jobs:
@@ -156,7 +156,7 @@ def test_a_stream_ends_when_its_listener_may_not_have_it_any_more(tmp_path, monk
 
 
 def test_an_id_ahead_of_all_swallows_nothing():
-    channel = Channel()
+    channel = JobEvents()
     channel.report(Progress(0.1))
     first = next(channel.since(0)).id
     ahead = first + 600_000
@@ -187,8 +187,8 @@ def test_only_who_has_seen_the_end_is_told_that_there_is_no_more(tmp_path):
 
 
 def test_of_many_listeners_each_gets_the_newest_only_and_it_is_written_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(listening, "_SENT_A_SECOND", 1e-9)
-    monkeypatch.setattr(listening, "_LONGEST_BETWEEN_S", PATIENCE_S)
+    monkeypatch.setattr(events, "_SENT_A_SECOND", 1e-9)
+    monkeypatch.setattr(events, "_LONGEST_BETWEEN_S", PATIENCE_S)
 
     async def scenario():
         async with running(tmp_path) as jobs:
@@ -200,7 +200,7 @@ def test_of_many_listeners_each_gets_the_newest_only_and_it_is_written_once(tmp_
                 return [event async for event in jobs.events(job.id)]
 
             listeners = [asyncio.create_task(listen()) for _ in range(40)]
-            await eventually(lambda: jobs._listening._listeners == 40)
+            await eventually(lambda: jobs._events.listeners == 40)
             for name in ("2", "3"):
                 (tmp_path / name).touch()
 
@@ -220,7 +220,7 @@ def test_of_many_listeners_each_gets_the_newest_only_and_it_is_written_once(tmp_
 
 @pytest.mark.parametrize("over", [False, True])
 def test_the_newest_is_a_progress_and_the_end(over):
-    channel = Channel()
+    channel = JobEvents()
     for fraction in (0.1, 0.2):
         channel.report(Progress(fraction))
     if over:

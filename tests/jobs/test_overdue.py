@@ -89,7 +89,7 @@ def test_a_waiting_job_is_answered_when_its_time_is_up(tmp_path):
             # The worker was busy all the while, and a kind with nothing to answer at once waits for it.
             assert (await service.get(holder.id)).status is JobStatus.RUNNING
             assert (await service.get(patient.id)).status is JobStatus.QUEUED
-            assert service.load().waiting["interactive"] == 1
+            assert service.waiting()["interactive"] == 1
             Path(gate(tmp_path)["path"]).touch()
             assert (await finished(service, patient)).result
             assert sum(service.load().running.values()) == 0
@@ -166,7 +166,7 @@ def test_one_that_an_earlier_process_took_in_is_answered_too(tmp_path):
         async with running(tmp_path, kinds=HASTY) as service:
             holder, _ = await service.submit("until_file", gate(tmp_path))
             job, _ = await service.submit("hasty", {}, time_limit_s=0.0)
-            await eventually(lambda: service.load().waiting["interactive"] == 1)
+            await eventually(lambda: service.waiting()["interactive"] == 1)
         async with busy(tmp_path) as service:
             done = await finished(service, job)
             assert done.result == {"echo": {}, "pid": done.result["pid"]}

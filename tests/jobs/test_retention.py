@@ -7,10 +7,10 @@ import pytest
 import sqlalchemy as sa
 from harness import database_of, eventually, finished, running, url_of
 
-from app.jobs.errors import JobNotFound
-from app.jobs.failure import failure
+from app.jobs.capacity import QueueLimit
+from app.jobs.errors import JobNotFound, failure
 from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
-from app.jobs.store import JobStore, QueueLimit
+from app.jobs.store import JobStore
 from app.jobs.tables import artifacts, idempotency_keys, jobs
 
 KIND = JobKind("solve", "nowhere:solve", "interactive", dropped_fields=frozenset({"weights"}))
@@ -27,7 +27,7 @@ def database(tmp_path):
 
 @pytest.fixture
 def store(database):
-    store = JobStore(database, "host:1:1:me", 3, {KIND.name: KIND.dropped_fields})
+    store = JobStore(database, "host:1:1:me", 3, [KIND])
     store.migrate()
     return store
 
@@ -39,7 +39,7 @@ def add(store, key=None, **payload):
 
 
 def succeed(store, job):
-    return store.succeed(job.id, job.attempt, WorkResult({"ok": 1}, b"bytes"), Progress(), None)
+    return store.succeed(job.id, job.attempt, WorkResult({"ok": 1}, b"bytes"), Progress())
 
 
 def age(database, job, days):
@@ -74,7 +74,7 @@ def test_what_is_old_goes_with_what_it_left(store, database):
 
 def test_unfinished_jobs_stay_however_old(store, database):
     running_job, waiting = add(store), add(store)
-    store.release(waiting.id, 1, Progress())
+    store.requeue(waiting.id, 1, Progress())
     with database.write() as connection:
         connection.execute(sa.update(jobs).values(created_at=0.0, started_at=0.0))
 
@@ -113,7 +113,7 @@ def test_large_fields_go_with_the_end(store, end):
     elif end == "failed":
         ended = store.fail(job.id, 1, failure("invalid-checkpoint", "no"), Progress())
     else:
-        assert store.release(job.id, 1, Progress()).payload["weights"] == "A" * 1000
+        assert store.requeue(job.id, 1, Progress()).payload["weights"] == "A" * 1000
         ended, _ = store.cancel(job.id)
 
     assert ended.status == end

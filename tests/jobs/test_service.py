@@ -13,9 +13,9 @@ from sqlalchemy.exc import OperationalError
 from structlog.contextvars import bound_contextvars
 
 from app.domain.errors import InvalidCheckpoint
-from app.jobs import housekeeping, stored_json, transitions, writer
+from app.jobs import attempts, maintenance, queries, stored_json
+from app.jobs.capacity import Capacity
 from app.jobs.errors import Draining, IdempotencyMismatch, JobNotFound, QueueFull, UnknownJobKind
-from app.jobs.lanes import Lanes
 from app.jobs.model import Idempotency, JobKind, JobStatus
 from policy_store.database import Database
 from policy_store.errors import DatabaseOccupied
@@ -160,7 +160,7 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
             with pytest.raises(QueueFull) as refusal:
                 await service.submit("echo", {})
             assert refusal.value.retry_after_s >= 1
-            assert service.load().waiting == {"interactive": 2, "batch": 0, "training": 0}
+            assert service.waiting() == {"interactive": 2, "batch": 0, "training": 0}
             await service.submit("train", {"path": str(gate)})  # the other lane has places of its own
             gate.touch()
             for job in jobs:
@@ -171,7 +171,7 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
 
 
 def test_retry_after_is_the_time_until_one_place_is_free():
-    lanes = Lanes(3)
+    lanes = Capacity(3)
     assert lanes.time_to_a_place("interactive", []) == 1.0
     lanes.ran("interactive", [4.0, 8.0])
     lanes.ran("training", [100.0])
@@ -188,7 +188,7 @@ def test_retry_after_is_the_time_until_one_place_is_free():
 
 
 def test_retry_after_believes_what_runs_longer_than_what_ran():
-    lanes = Lanes(1)
+    lanes = Capacity(1)
     lanes.ran("interactive", [0.1, 0.1])
     # It goes on for as long again, unless its time limit ends it.
     assert lanes.time_to_a_place("interactive", [("interactive", 60.0, None)]) == 60.0
@@ -257,7 +257,7 @@ def test_a_list_reads_neither_payloads_nor_results(tmp_path, monkeypatch):
             ended = [
                 await finished(service, (await service.submit("echo", {"large": n}))[0]) for n in range(3)
             ]
-            monkeypatch.setattr(transitions, "read_later", read)
+            monkeypatch.setattr(queries, "read_later", read)
             page = await service.list(10, None, JobStatus.SUCCEEDED)
             assert [job.id for job in page.jobs] == [job.id for job in reversed(ended)]
             assert (await service.list(10, None, JobStatus.FAILED)).jobs == ()
@@ -436,9 +436,9 @@ def test_a_result_survives_a_database_that_cannot_be_written_for_a_while(tmp_pat
 
 
 def test_a_result_that_could_not_be_stored_for_long_costs_an_attempt_and_not_the_job(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "_FIRST_PAUSE_S", 0.0)
-    monkeypatch.setattr(housekeeping, "_SAVE_INTERVAL_S", 0.01)
-    monkeypatch.setattr(housekeeping, "_LOOK_INTERVAL_S", 0.0)
+    monkeypatch.setattr(attempts, "_FIRST_PAUSE_S", 0.0)
+    monkeypatch.setattr(maintenance, "_SAVE_INTERVAL_S", 0.01)
+    monkeypatch.setattr(maintenance, "_LOOK_INTERVAL_S", 0.01)
 
     async def scenario():
         gate = tmp_path / "gate"

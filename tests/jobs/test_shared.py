@@ -29,12 +29,13 @@ from postgresql_server import PostgresqlServer
 from sqlalchemy.exc import OperationalError
 from structlog.contextvars import bound_contextvars
 
+from app.jobs.capacity import QueueLimit
 from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull
-from app.jobs.lease import Lease
 from app.jobs.local import LocalExecutor
 from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
-from app.jobs.store import JobStore, QueueLimit
+from app.jobs.peers import PostgresPeers
+from app.jobs.store import JobStore
 
 HERE = Path(__file__).parent
 
@@ -278,36 +279,36 @@ def test_nobody_is_judged_before_all_had_the_time_to_show_themselves(url):
     now = [1000.0]
     database = database_of(url)
     JobStore(database, "a", 3).migrate()
-    judge, other = (Lease(database, name, 10.0, clock=lambda: now[0]) for name in ("judge", "other"))
+    judge, other = (PostgresPeers(database, name, 10.0, clock=lambda: now[0]) for name in ("judge", "other"))
 
     def pass_time(seconds):
         now[0] += seconds
         with database.write() as connection:
             connection.execute(sa.text(f"UPDATE job_owners SET seen_at = seen_at - {seconds}"))
 
-    assert other.show() == {}
-    judge.show()
+    assert other.beat() == {}
+    judge.beat()
     # A newcomer does not know for how long the others could not show themselves.
     assert judge.is_alive("other")
     assert judge.is_alive("never seen")
     for _ in range(3):
         pass_time(4.0)
-        judge.show()
+        judge.beat()
     assert not judge.is_alive("other")
     assert not judge.is_alive("never seen")
-    other.show()
+    other.beat()
     assert judge.is_alive("other")
     # The database was away for long: all look dead, and all get a lease's time.
     pass_time(60.0)
-    judge.show()
+    judge.beat()
     assert judge.is_alive("other")
-    other.show()
+    other.beat()
     for _ in range(3):
         pass_time(4.0)
-        judge.show()
-        other.show()
+        judge.beat()
+        other.beat()
     assert judge.is_alive("other")
-    other.end()
+    other.forget()
     assert not judge.is_alive("other")
     database.dispose()
 
@@ -331,19 +332,19 @@ def test_a_service_that_takes_its_own_job_again_loses_no_worker(url, tmp_path):
     async def scenario():
         async with running(url, slots=2, lease_s=LEASE_S) as one:
             database = database_of(url)
-            judge = JobStore(database, "judge", 3)
+            judge = JobStore(database, "judge", 3, KINDS)
             job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
             await reports(one, job)
-            [lost] = await asyncio.to_thread(judge.recover, ["until_file"], lambda owner: False)
+            [lost] = await asyncio.to_thread(judge.recover, lambda owner: False)
             assert (lost.id, lost.status) == (job.id, JobStatus.QUEUED)
             # The other worker of the same service takes it, while the first still works on it.
-            one._dispatcher._waiting.heard("interactive")
-            await eventually(lambda: one._dispatcher._runs.of(job.id).job.attempt == 2)
+            one._dispatcher._hear("waiting", "interactive")
+            await eventually(lambda: one._attempts.of(job.id).job.attempt == 2)
             assert (await one.cancel(job.id)).status is JobStatus.RUNNING
             (tmp_path / "gate").touch()
             ended = await finished(one, job)
             assert (ended.status, ended.attempt) == (JobStatus.CANCELLED, 2)
-            await eventually(lambda: not one._dispatcher._runs)
+            await eventually(lambda: not one._attempts)
             assert sum(one.load().running.values()) == 0
             await eventually(lambda: one.load().ready == 2)
             both = [(await one.submit("echo", {}))[0] for _ in range(2)]
@@ -379,17 +380,17 @@ def test_times_are_those_of_the_database_whatever_a_machine_thinks(url):
     hours = 3600.0
     database = database_of(url)
     astray = JobStore(database, "astray", 3, clock=Clock(lambda: time.time() + 10 * hours))
-    right = JobStore(database, "right", 3)
+    right = JobStore(database, "right", 3, KINDS)
     astray.migrate()
     before = time.time() - 60.0
     taken_in, _ = astray.insert(KINDS[0], {}, run_now=False, limit=QueueLimit(9, 1.0), time_limit_s=hours)
     assert before < taken_in.job.created_at.timestamp() < time.time() + 60.0
     for store in (astray, right):
-        [(_, _, deadline)] = store.deadlines()
+        [deadline] = store.deadlines([KINDS[0].name]).values()
         assert hours - 60.0 < deadline - store.clock.now() <= hours
-    claim = astray.claim("interactive")
+    claim = astray.claim(["interactive"])
     assert hours - 60.0 < claim.deadline - astray.clock.now() <= hours
-    done = right.succeed(claim.job.id, 1, WorkResult({}), Progress(), None)
+    done = right.succeed(claim.job.id, 1, WorkResult({}), Progress())
     assert before < done.created_at.timestamp() <= done.started_at.timestamp()
     assert done.started_at <= done.finished_at
     assert done.finished_at.timestamp() < time.time() + 60.0
@@ -402,7 +403,7 @@ def test_a_service_that_was_taken_for_dead_gives_up_its_work(url, tmp_path):
             job, _ = await one.submit("until_file", {"path": str(tmp_path / "gate")})
             await reports(one, job)
             # As another service does that has not seen this one for too long.
-            lost = await asyncio.to_thread(other._store.recover, ["until_file"], lambda owner: False)
+            lost = await asyncio.to_thread(other._store.recover, lambda owner: False)
             assert [each.id for each in lost] == [job.id]
             await eventually(lambda: one.load().restarts == 1)
             (tmp_path / "gate").touch()

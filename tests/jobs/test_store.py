@@ -1,5 +1,6 @@
 """The job table: transitions, fencing, recovery, and that no order of events finishes a job twice."""
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,10 +13,10 @@ from harness import database_of, url_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.jobs.errors import InvalidCursor
-from app.jobs.failure import failure
+from app.jobs.capacity import QueueLimit
+from app.jobs.errors import InvalidCursor, failure
 from app.jobs.model import Job, JobKind, JobStatus, Progress, WorkResult
-from app.jobs.store import VERSION_TABLE, JobStore, QueueLimit
+from app.jobs.store import VERSION_TABLE, JobStore
 from app.jobs.tables import metadata
 
 KIND = JobKind("solve", "nowhere:solve", "interactive")
@@ -32,7 +33,7 @@ def database(any_database_url):
 
 @pytest.fixture
 def store(database):
-    store = JobStore(database, "host:1:1:me", 3)
+    store = JobStore(database, "host:1:1:me", 3, [KIND])
     store.migrate()
     return store
 
@@ -50,29 +51,32 @@ def test_the_migrations_make_the_tables_that_the_code_uses(store, database):
     assert differences == []
 
 
-def test_a_late_result_of_a_lost_attempt_is_dropped(store):
-    job = add(store)
+def test_a_late_result_of_a_lost_attempt_is_dropped(database):
     called = []
 
     def on_success(connection: sa.Connection, job: Job, work: WorkResult) -> dict[str, Any]:
         called.append(job.attempt)
         return work.result
 
-    assert store.claim("interactive").job.attempt == 1
-    assert store.lose(job.id, 1, "its worker died", SOME).status is JobStatus.QUEUED
+    store = JobStore(database, "host:1:1:me", 3, [replace(KIND, on_success=on_success)])
+    store.migrate()
+    job = add(store)
+
+    assert store.claim(["interactive"]).job.attempt == 1
+    assert store.mark_crashed(job.id, 1, "its worker died", SOME).status is JobStatus.QUEUED
     late = WorkResult({"late": True}, b"late")
-    assert store.succeed(job.id, 1, late, SOME, on_success) is None
-    assert store.claim("interactive").job.attempt == 2
-    assert store.succeed(job.id, 1, late, SOME, on_success) is None
+    assert store.succeed(job.id, 1, late, SOME) is None
+    assert store.claim(["interactive"]).job.attempt == 2
+    assert store.succeed(job.id, 1, late, SOME) is None
     assert store.fail(job.id, 1, failure("x", "y"), SOME) is None
-    assert store.lose(job.id, 1, "", SOME) is None
-    assert store.release(job.id, 1, SOME) is None
+    assert store.mark_crashed(job.id, 1, "", SOME) is None
+    assert store.requeue(job.id, 1, SOME) is None
     store.save_progress([(job.id, 1, Progress(0.9))])
     running = store.get(job.id)
     assert (running.status, running.attempt, running.progress) == (JobStatus.RUNNING, 2, SOME)
-    done = store.succeed(job.id, 2, WorkResult({"late": False}), SOME, on_success)
+    done = store.succeed(job.id, 2, WorkResult({"late": False}), SOME)
     assert done.result == {"late": False}
-    assert store.succeed(job.id, 2, late, SOME, on_success) is None
+    assert store.succeed(job.id, 2, late, SOME) is None
     assert store.get(job.id) == done
     assert called == [2]
     assert store.artifact(job.id) is None
@@ -80,20 +84,20 @@ def test_a_late_result_of_a_lost_attempt_is_dropped(store):
 
 def test_the_queue_is_first_in_first_out_and_a_lost_job_keeps_its_place(store):
     first, second, third = (add(store) for _ in range(3))
-    assert store.claim("training") is None
-    assert store.claim("interactive").job.id == first.id
-    assert store.claim("interactive").job.id == second.id
-    store.lose(first.id, 1, "its worker died", SOME)
-    assert [store.claim("interactive").job.id for _ in range(2)] == [first.id, third.id]
-    assert store.claim("interactive") is None
+    assert store.claim(["training"]) is None
+    assert store.claim(["interactive"]).job.id == first.id
+    assert store.claim(["interactive"]).job.id == second.id
+    store.mark_crashed(first.id, 1, "its worker died", SOME)
+    assert [store.claim(["interactive"]).job.id for _ in range(2)] == [first.id, third.id]
+    assert store.claim(["interactive"]) is None
 
 
 def test_artifacts_belong_to_their_job_alone(store):
     with_bytes, without = add(store), add(store)
     for _ in range(2):
-        store.claim("interactive")
-    assert store.succeed(with_bytes.id, 1, WorkResult({}, b"\0bytes"), SOME, None).has_artifact
-    assert not store.succeed(without.id, 1, WorkResult({}), SOME, None).has_artifact
+        store.claim(["interactive"])
+    assert store.succeed(with_bytes.id, 1, WorkResult({}, b"\0bytes"), SOME).has_artifact
+    assert not store.succeed(without.id, 1, WorkResult({}), SOME).has_artifact
     assert [job.has_artifact for job in store.page(5, None).jobs] == [False, True]
     assert store.artifact(with_bytes.id) == b"\0bytes"
 
@@ -103,9 +107,9 @@ def test_the_next_start_gives_back_what_dead_owners_ran(store, database):
     waiting = add(store)
     store.save_progress([(mine[0].id, 1, SOME)])
     store.cancel(mine[1].id)
-    after = JobStore(database, "host:2:1:after", 2)
-    assert after.recover([KIND.name], lambda owner: True) == []
-    after.recover([KIND.name], lambda owner: owner == "host:2:1:after")
+    after = JobStore(database, "host:2:1:after", 2, [KIND])
+    assert after.recover(lambda owner: True) == []
+    after.recover(lambda owner: owner == "host:2:1:after")
     assert [after.get(job.id).status.value for job in (*mine, waiting)] == [
         "queued",
         "cancelled",
@@ -113,13 +117,14 @@ def test_the_next_start_gives_back_what_dead_owners_ran(store, database):
         "queued",
     ]
     assert after.get(mine[0].id).progress == SOME
-    assert store.succeed(mine[0].id, 1, WorkResult({}), SOME, None) is None
+    assert store.succeed(mine[0].id, 1, WorkResult({}), SOME) is None
     # A second loss is the last of two attempts.
-    assert after.claim("interactive").job.id == mine[0].id
-    assert [job.status for job in after.recover([KIND.name], lambda owner: False)] == [JobStatus.FAILED]
+    assert after.claim(["interactive"]).job.id == mine[0].id
+    assert [job.status for job in after.recover(lambda owner: False)] == [JobStatus.FAILED]
     assert after.get(mine[0].id).error["code"] == "worker-lost"
     # A version without this kind of job can only fail what waits for it.
-    assert {job.error["code"] for job in after.recover(["other"], lambda owner: True)} == {"unknown-job-kind"}
+    later = JobStore(database, "host:3:1:later", 2)
+    assert {job.error["code"] for job in later.recover(lambda owner: True)} == {"unknown-job-kind"}
 
 
 @pytest.mark.parametrize("cursor", ["", "-1", "x", "1e3", "٣", "9" * 30])
@@ -128,7 +133,7 @@ def test_only_cursors_of_pages_are_taken(store, cursor):
         store.page(10, cursor)
 
 
-ACTIONS = ("claim", "succeed", "fail", "lose", "release", "cancel", "recover", "progress")
+ACTIONS = ("claim", "succeed", "fail", "crash", "requeue", "cancel", "recover", "progress")
 
 
 @settings(max_examples=40, deadline=None)
@@ -136,33 +141,34 @@ ACTIONS = ("claim", "succeed", "fail", "lose", "release", "cancel", "recover", "
 def test_no_order_of_events_finishes_a_job_twice(steps):
     with TemporaryDirectory() as folder:
         database = database_of(url_of(Path(folder)))
-        store = JobStore(database, "host:1:1:me", 3)
-        store.migrate()
-        ids = [add(store).id for _ in range(2)]
         succeeded: list[str] = []
 
         def on_success(connection: sa.Connection, job: Job, work: WorkResult) -> dict[str, Any]:
             succeeded.append(job.id)
             return work.result
 
+        store = JobStore(database, "host:1:1:me", 3, [replace(KIND, on_success=on_success)])
+        store.migrate()
+        ids = [add(store).id for _ in range(2)]
+
         for action, which, back in steps:
             before = [store.get(job_id) for job_id in ids]
             job_id, attempt = ids[which], before[which].attempt - back
             match action:
                 case "claim":
-                    store.claim("interactive")
+                    store.claim(["interactive"])
                 case "succeed":
-                    store.succeed(job_id, attempt, WorkResult({"by": attempt}), SOME, on_success)
+                    store.succeed(job_id, attempt, WorkResult({"by": attempt}), SOME)
                 case "fail":
                     store.fail(job_id, attempt, failure("x", "y"), SOME)
-                case "lose":
-                    store.lose(job_id, attempt, "died", SOME)
-                case "release":
-                    store.release(job_id, attempt, SOME)
+                case "crash":
+                    store.mark_crashed(job_id, attempt, "died", SOME)
+                case "requeue":
+                    store.requeue(job_id, attempt, SOME)
                 case "cancel":
                     store.cancel(job_id)
                 case "recover":
-                    store.recover([KIND.name], lambda owner: False)
+                    store.recover(lambda owner: False)
                 case "progress":
                     store.save_progress([(job_id, attempt, Progress(0.7))])
             for old in before:

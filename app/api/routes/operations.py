@@ -45,7 +45,7 @@ async def get_health() -> Health:
 def get_readiness(services: Served) -> Readiness:
     """Answer 200 once the store and a warm worker answer, 503 otherwise."""
     try:
-        policies = services.library.count()
+        policies, waiting = services.library.count(), services.jobs.waiting()
     except SQLAlchemyError as error:
         raise NotReady(f"the store does not answer: {type(error).__name__}") from error
     load = services.jobs.load()
@@ -56,7 +56,7 @@ def get_readiness(services: Served) -> Readiness:
         workers_ready=load.ready,
         workers=load.capacity,
         jobs_running=sum(load.running.values()),
-        jobs_waiting=sum(load.waiting.values()),
+        jobs_waiting=sum(waiting.values()),
         policies=policies,
     )
 

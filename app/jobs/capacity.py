@@ -21,46 +21,57 @@ class QueueLimit:
     retry_after_s: float
 
 
-class Lanes:
-    """Counts the workers in use and the jobs that wait, lane by lane.
+class Capacity:
+    """Counts the workers in use, lane by lane, and remembers where it is worth to look for a job.
 
     Trainings hold at most all workers but one, and so do the jobs of batches; where there is only one, they
     share it. Interactive jobs come first in both cases, then those of batches.
 
     Parameters
     ----------
-    capacity
-        How many workers there are.
+    workers
+        How many there are.
 
     Attributes
     ----------
-    running, waiting
-        Jobs by lane; what runs includes what a worker is reserved for.
+    running
+        Jobs by lane; a job that a worker is reserved for is among them.
     """
 
-    def __init__(self, capacity: int) -> None:
-        self._workers: dict[Lane, int] = dict.fromkeys(LANES, max(1, capacity - 1))
-        self._workers["interactive"] = self._capacity = capacity
+    def __init__(self, workers: int) -> None:
+        self._all = workers
+        self._most: dict[Lane, int] = dict.fromkeys(LANES, max(1, workers - 1)) | {"interactive": workers}
         self.running: dict[Lane, int] = dict.fromkeys(LANES, 0)
-        self.waiting: dict[Lane, int] = dict.fromkeys(LANES, 0)
-        self._durations: dict[Lane, deque[float]] = {
-            lane: deque(maxlen=REMEMBERED_DURATIONS) for lane in LANES
-        }
+        self._looks = 0
+        # Only hints: the table says what waits, and one look too many finds nothing.
+        self._hints: set[Lane] = set()
+        self._durations = {lane: deque[float](maxlen=REMEMBERED_DURATIONS) for lane in LANES}
 
     def may_start(self, lane: Lane, ready: int) -> bool:
         """Say whether a worker is free for a job of the lane, when ``ready`` workers are warm."""
-        return sum(self.running.values()) < ready and self.running[lane] < self._workers[lane]
+        # What is being looked for may be of any lane.
+        taken = sum(self.running.values()) + self._looks
+        return taken < ready and self.running[lane] + self._looks < self._most[lane]
 
-    def is_first(self, lane: Lane) -> bool:
-        """Say whether a new job of the lane would go before no other if it started now."""
-        return self.waiting["interactive"] == 0 and self.waiting[lane] == 0
+    def hint(self, lanes: Iterable[Lane]) -> None:
+        """Take note that a job may wait in some lanes."""
+        self._hints.update(lanes)
 
-    def next_lane(self, ready: int) -> Lane | None:
-        """Return the lane whose oldest job starts next; None if nothing waits or no worker is free for it."""
-        for lane in LANES:
-            if self.waiting[lane] > 0 and self.may_start(lane, ready):
-                return lane
-        return None
+    def begin_look(self, ready: int) -> tuple[Lane, ...]:
+        """Return the lanes to look for a job in, in their order, and keep a worker for it; none: do not look.
+
+        The hints to them are forgotten before the look: what is told of meanwhile is a reason to look again.
+        """
+        lanes = tuple(lane for lane in LANES if lane in self._hints and self.may_start(lane, ready))
+        self._looks += bool(lanes)
+        self._hints.difference_update(lanes)
+        return lanes
+
+    def end_look(self, found: Lane | None) -> None:
+        """Take note of the lane of the job that was found."""
+        self._looks -= 1
+        if found is not None:
+            self.running[found] += 1
 
     def ran(self, lane: Lane, durations_s: Iterable[float]) -> None:
         """Note how long jobs of the lane took."""
@@ -83,15 +94,14 @@ class Lanes:
             What is left of the one that ends first among those for which the lane waits. Where a worker is
             free, or soon will be, the mean of the lane's last durations over the workers that it can have.
         """
-        all_of_them = tuple(running)
-        own = [each for each in all_of_them if each[0] == lane]
-        workers = self._workers[lane]
-        if len(own) >= workers:
+        busy = tuple(running)
+        own = [each for each in busy if each[0] == lane]
+        if len(own) >= self._most[lane]:
             seconds = min(self._rest(*each) for each in own)
-        elif len(all_of_them) >= self._capacity:
-            seconds = min(self._rest(*each) for each in all_of_them)
+        elif len(busy) >= self._all:
+            seconds = min(self._rest(*each) for each in busy)
         else:
-            seconds = self._mean(lane) / workers
+            seconds = self._mean(lane) / self._most[lane]
         return max(1.0, seconds)
 
     def _rest(self, lane: Lane, ran_s: float, left_s: float | None) -> float:

@@ -1,0 +1,209 @@
+"""Attempts at jobs: those that run here, and what becomes of their job in the table when they have ended."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, ParamSpec, TypeVar
+
+from sqlalchemy.exc import InterfaceError, OperationalError
+
+from app.jobs.errors import INTERNAL_ERROR, describe, failure
+from app.jobs.events import JobEvents
+from app.jobs.executor import Execution, Outcome, Raised, Returned
+from app.jobs.model import BEST_KNOWN, Job, JobStatus, JobSummary, Lane, Progress
+from app.jobs.store import JobStore
+
+_TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
+
+_log = logging.getLogger(__name__)
+P = ParamSpec("P")
+T = TypeVar("T")
+J = TypeVar("J", bound=JobSummary)
+
+Reason = Literal["time", "cancel", "stop", "gone"]
+"""Why a worker was killed: its work did not end with its time, or its cancellation, or the service; or the
+job is no longer this service's."""
+
+
+@dataclass(slots=True, eq=False)
+class Attempt:
+    """One attempt at a job.
+
+    Attributes
+    ----------
+    job, deadline
+        As they were taken from the queue.
+    events
+        Of the job.
+    begun_at
+        When it was handed to a worker, by the service's clock.
+    progress
+        The newest; ``unsaved`` if it is not in the table yet, where the last went at ``saved_at``.
+    execution
+        The work; None until it is handed over.
+    at_once
+        Whether it holds no worker, because its time is up and it is answered beside them.
+    killed_for
+        Why its worker was killed, if it was.
+    timers
+        What would kill it later.
+    asked_to_stop
+        Whether somebody cancelled it, or it took longer than its kind may.
+    """
+
+    job: Job
+    deadline: float | None
+    events: JobEvents
+    progress: Progress
+    begun_at: float
+    saved_at: float
+    unsaved: bool = False
+    at_once: bool = False
+    execution: Execution | None = None
+    killed_for: Reason | None = None
+    timers: list[asyncio.TimerHandle] = field(default_factory=list)
+    asked_to_stop: bool = False
+
+    @property
+    def payload(self) -> Mapping[str, Any]:
+        """What the work gets: the job's, and the progress of an earlier attempt if it has a plan."""
+        if self.job.attempt == 1 or self.job.progress.assignment is None:
+            return self.job.payload
+        return {**self.job.payload, BEST_KNOWN: self.job.progress.as_json()}
+
+    def report(self, progress: Progress) -> None:
+        """Take note of progress, and tell it unless the job is no longer this service's."""
+        self.progress, self.unsaved = progress, True
+        if self.killed_for != "gone":
+            self.events.report(progress)
+
+    def stop(self, grace_s: float, reason: Reason = "cancel") -> None:
+        """Ask the work to stop by itself, and end its worker if it has not after so many seconds."""
+        if self.execution is not None and not self.asked_to_stop:
+            self.asked_to_stop = True
+            self.execution.cancel()
+            self.timers.append(asyncio.get_running_loop().call_later(grace_s, self.kill, reason))
+
+    def kill(self, reason: Reason) -> None:
+        """End the worker, for the first reason that is given."""
+        if self.killed_for is None and self.execution is not None:
+            self.killed_for = reason
+            self.execution.kill()
+
+
+class Attempts:
+    """The attempts that run here, each until its end is stored.
+
+    A job may have two: where this service was taken for dead by another and has then taken the job again, the
+    earlier attempt counts no more, and ends while the later one works.
+    """
+
+    def __init__(self) -> None:
+        self._running: dict[tuple[str, int], Attempt] = {}
+
+    def __iter__(self) -> Iterator[Attempt]:
+        return iter(list(self._running.values()))
+
+    def __len__(self) -> int:
+        return len(self._running)
+
+    def add(self, attempt: Attempt) -> None:
+        """Take note of an attempt, and end an earlier one at the same job."""
+        earlier = self.of(attempt.job.id)
+        self._running[attempt.job.id, attempt.job.attempt] = attempt
+        if earlier is not None:
+            earlier.kill("gone")
+
+    def remove(self, attempt: Attempt) -> None:
+        """Take note that the end of an attempt is stored."""
+        del self._running[attempt.job.id, attempt.job.attempt]
+
+    def of(self, job_id: str) -> Attempt | None:
+        """Return the newest attempt at a job; None if it does not run here."""
+        attempts = [attempt for (of, _), attempt in self._running.items() if of == job_id]
+        return max(attempts, key=lambda attempt: attempt.job.attempt, default=None)
+
+    def newest(self, job: J) -> J:
+        """Return a job with the progress that is known here and not yet in the table."""
+        attempt = self.of(job.id) if job.status is JobStatus.RUNNING else None
+        return job if attempt is None else replace(job, progress=attempt.progress)
+
+    def times(self, now: float) -> Iterator[tuple[Lane, float, float | None]]:
+        """Return of each that holds a worker its lane, how long it has run, and what its limit leaves it."""
+        for each in self:
+            if not each.at_once:
+                left_s = None if each.deadline is None else each.deadline - now
+                yield each.job.lane, now - each.begun_at, left_s
+
+
+class Writer:
+    """The one thread that writes to the job table: it runs functions of the store, one after the other.
+
+    What the event loop learns of the table by it comes in the order of the commits.
+    """
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="jobs-write")
+
+    async def write(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Run a function and return what it returns."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, lambda: function(*args, **kwargs))
+
+    async def write_with_retry(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Write what must not be lost: a database that is locked, full or away is tried again for a while."""
+        pause = _FIRST_PAUSE_S
+        for _ in range(_TRIES - 1):
+            try:
+                return await self.write(function, *args, **kwargs)
+            except (OperationalError, InterfaceError):
+                _log.exception("the database could not be written; next try in %.1f s", pause)
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+        return await self.write(function, *args, **kwargs)
+
+    async def close(self) -> None:
+        """Wait for what is being written, and end the thread."""
+        await asyncio.to_thread(self._thread.shutdown)
+
+
+async def complete(
+    attempt: Attempt, outcome: Outcome, store: JobStore, writer: Writer, grace_s: float
+) -> Job | None:
+    """Bring an outcome into the table; None if the job has gone on without this attempt.
+
+    Parameters
+    ----------
+    attempt, outcome
+        What has ended, and how.
+    store, writer
+        The job table, and its writer.
+    grace_s
+        How long work may go on after its time limit, for the reason of a job that did longer.
+    """
+    job, progress, write = attempt.job, attempt.progress, writer.write_with_retry
+    kind, which = store.kinds[job.kind], (job.id, job.attempt)
+    if isinstance(outcome, Returned):
+        try:
+            return await write(store.succeed, *which, outcome.work, progress)
+        except Exception as exception:
+            _log.exception("a job's result could not be stored")
+            outcome = Raised(describe(exception), "")
+    if isinstance(outcome, Raised):
+        if outcome.error["code"] == INTERNAL_ERROR:
+            trace = {"worker_traceback": outcome.traceback}
+            _log.error("a job failed: %s", outcome.error["detail"], extra=trace)
+        return await write(store.fail, *which, outcome.error, progress)
+    # One whose time is up waits again, where there is an answer for those.
+    waits = kind.at_once is not None and not (attempt.at_once or attempt.asked_to_stop)
+    if attempt.killed_for == "stop" or (attempt.killed_for == "time" and waits):
+        return await write(store.requeue, *which, progress)
+    if attempt.killed_for == "time":
+        detail = f"the work did not stop within {grace_s:g} s after its time was up, and was ended"
+        return await write(store.fail, *which, failure("time-limit-exceeded", detail), progress)
+    _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)
+    return await write(store.mark_crashed, *which, outcome.reason, progress)

@@ -1,0 +1,295 @@
+"""Looking at the job table: rows as jobs, one job, a page of them, what they left, how many wait.
+
+Nothing here changes the table, or waits for one who does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+import sqlalchemy as sa
+from sqlalchemy import Connection, RowMapping
+
+from app.jobs.clock import Clock
+from app.jobs.errors import InvalidCursor, JobNotFound
+from app.jobs.model import LANES, Job, JobPage, JobStatus, JobSummary, Lane, Progress
+from app.jobs.stored_json import read_later
+from app.jobs.tables import DATABASE_NOW, artifacts, jobs
+
+_MOST_UNFINISHED = 1000
+"""Results that wait to be completed, at most; one more stays as it is."""
+
+_now = sa.select(DATABASE_NOW)
+
+Row = RowMapping | dict[str, Any]
+
+has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
+_TEXTS = {"payload", "result"}
+# As texts, which most of those who handle a job only hand on.
+whole = [
+    sa.cast(column, sa.Text).label(column.name) if column.name in _TEXTS else column for column in jobs.c
+]
+select_jobs = sa.select(*whole, has_artifact)
+# Payloads, results and plans may have a megabyte each.
+_LARGE = _TEXTS | {"assignment"}
+select_small = sa.select(*(column for column in jobs.c if column.name not in _LARGE), has_artifact)
+select_summaries = select_small.add_columns(jobs.c.assignment)
+# What is read in order to be changed is locked, where a database does not let writers take turns.
+select_to_change = select_jobs.with_for_update(of=jobs)
+
+
+class Announcements(Protocol):
+    """Short messages between the services that share a database; one may get lost."""
+
+    def tell(self, message: str) -> None:
+        """Send a message soon; never blocks."""
+
+    def close(self) -> None:
+        """End; what was told is sent if that is possible."""
+
+
+class Database(Protocol):
+    """What the jobs room needs of a database."""
+
+    shared: bool
+    """Whether several services may work on it; otherwise transactions that write take turns."""
+
+    def occupy(self) -> None:
+        """Keep other services off, where it is not shared."""
+
+    def vacate(self) -> None:
+        """Let another service have it."""
+
+    def write(self) -> AbstractContextManager[Connection]:
+        """Open a write transaction, committed at its end and rolled back by an exception."""
+
+    def read(self) -> AbstractContextManager[Connection]:
+        """Open a read transaction."""
+
+    def migrate(self, script_location: Path, version_table: str) -> None:
+        """Bring the tables of an Alembic folder to its newest version."""
+
+    def take_turn(self, connection: Connection, name: str) -> None:
+        """Let the transactions that call this with one name follow one another."""
+
+    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
+        """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A job that was taken to be run.
+
+    Attributes
+    ----------
+    job
+        The job.
+    deadline
+        When its time is up, by the service's clock.
+    more_wait
+        Whether there are others where it was looked for.
+    """
+
+    job: Job
+    deadline: float | None
+    more_wait: bool = False
+
+
+class JobQueries:
+    """Reads the job table.
+
+    Parameters
+    ----------
+    database
+        Where the tables are.
+    clock
+        Of the service.
+
+    Attributes
+    ----------
+    database, clock
+        The same.
+    """
+
+    def __init__(self, database: Database, clock: Clock) -> None:
+        self.database, self.clock = database, clock
+
+    def _times(self, connection: Connection) -> tuple[float, float]:
+        """Return the time by the clock of the table, and how many seconds the service's is ahead of that.
+
+        It is the one that all who write to the table share, in seconds since 1970.
+        """
+        mine = self.clock.now()
+        now = float(connection.execute(_now).scalar_one()) if self.database.shared else mine
+        return now, mine - now
+
+    def get(self, job_id: str) -> Job:
+        """Return a job.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self.database.read() as connection:
+            return job_of(find(connection, job_id, select_jobs))
+
+    def look(self, job_id: str) -> JobSummary:
+        """Return a job without its payload and result.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        with self.database.read() as connection:
+            return summary_of(find(connection, job_id, select_summaries))
+
+    def result_text(self, job_id: str) -> str | None:
+        """Return a job's result as JSON, as it is stored; None without one."""
+        statement = sa.select(sa.cast(jobs.c.result, sa.Text)).where(jobs.c.id == job_id)
+        with self.database.read() as connection:
+            return connection.scalar(statement)
+
+    def artifact(self, job_id: str) -> bytes | None:
+        """Return the bytes that a job left behind; None if it left none.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
+        left = sa.select(jobs.c.id, artifacts.c.data).outerjoin(artifacts, artifacts.c.job_id == jobs.c.id)
+        with self.database.read() as connection:
+            data: bytes | None = find(connection, job_id, left)["data"]
+        return data
+
+    def page(self, limit: int, cursor: str | None, status: JobStatus | None = None) -> JobPage:
+        """Return jobs, newest first, after the cursor; new jobs do not shift the pages that follow.
+
+        Parameters
+        ----------
+        limit
+            How many at most.
+        cursor
+            Of the page before; None for the first.
+        status
+            Only the jobs of that status; None: all.
+
+        Raises
+        ------
+        InvalidCursor
+            If no page gave out such a cursor.
+        """
+        statement = select_small.order_by(jobs.c.number.desc()).limit(limit + 1)
+        if status is not None:
+            statement = statement.where(jobs.c.status == status)
+        if cursor is not None:
+            if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
+                raise InvalidCursor(cursor)
+            statement = statement.where(jobs.c.number < int(cursor))
+        with self.database.read() as connection:
+            rows = connection.execute(statement).mappings().all()
+        more = len(rows) > limit
+        rows = rows[:limit]
+        return JobPage(tuple(summary_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
+
+    def waiting(self) -> dict[Lane, int]:
+        """Return how many jobs wait in each lane."""
+        with self.database.read() as connection:
+            return {lane: waiting_in(connection, lane) for lane in LANES}
+
+    def deadlines(self, kinds: Iterable[str]) -> dict[str, float]:
+        """Return when the time of those waiting jobs of some kinds is up that have one, by their id."""
+        statement = sa.select(jobs.c.id, jobs.c.deadline).where(
+            jobs.c.status == JobStatus.QUEUED, jobs.c.deadline.is_not(None), jobs.c.kind.in_(list(kinds))
+        )
+        with self.database.read() as connection:
+            _, ahead = self._times(connection)
+            return {row.id: row.deadline + ahead for row in connection.execute(statement)}
+
+    def recent_durations(self, lane: Lane, limit: int) -> list[float]:
+        """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
+        statement = (
+            sa.select(jobs.c.finished_at - jobs.c.started_at)
+            .where(jobs.c.status == JobStatus.SUCCEEDED, jobs.c.lane == lane)
+            .order_by(jobs.c.number.desc())
+            .limit(limit)
+        )
+        with self.database.read() as connection:
+            return [float(seconds) for seconds in connection.scalars(statement)][::-1]
+
+
+def find(connection: Connection, job_id: str, select: sa.Select[Any]) -> RowMapping:
+    """Return what is selected of a job.
+
+    Raises
+    ------
+    JobNotFound
+        If no job has that id.
+    """
+    row = connection.execute(select.where(jobs.c.id == job_id)).mappings().first()
+    if row is None:
+        raise JobNotFound(job_id)
+    return row
+
+
+def waiting_in(connection: Connection, lane: Lane) -> int:
+    """Return how many jobs wait in a lane."""
+    waits = jobs.c.status == JobStatus.QUEUED, jobs.c.lane == lane
+    return connection.execute(sa.select(sa.func.count()).where(*waits)).scalar_one()
+
+
+def has_place(connection: Connection) -> bool:
+    """Say whether one more result can wait to be completed."""
+    others = sa.select(sa.func.count()).where(jobs.c.unfinished.is_not(None))
+    return connection.execute(others).scalar_one() < _MOST_UNFINISHED
+
+
+def progress_columns(progress: Progress) -> dict[str, Any]:
+    """Return the columns of a progress by their names."""
+    fields = progress.as_json()
+    return {"assignment": fields.pop("assignment"), "progress": fields}
+
+
+def progress_of(row: Row) -> Progress:
+    """Return the stored progress of a row, with its plan if that was selected."""
+    # Jobs of earlier versions have their plan in the other column.
+    return Progress(**{"assignment": row.get("assignment"), **row["progress"]})
+
+
+def job_of(row: Row) -> Job:
+    """Return the job that a row with ``has_artifact`` describes."""
+    return Job(**_summary(row), payload=read_later(row["payload"]), result=read_later(row["result"]))
+
+
+def summary_of(row: Row) -> JobSummary:
+    """Return what a row of :data:`select_summaries` or :data:`select_small` describes."""
+    return JobSummary(**_summary(row))
+
+
+def claim_of(row: Row, ahead: float, more_wait: bool = False) -> Claim:
+    """Return the claim to the job of a row; the service's clock is ``ahead`` of the one of its deadline."""
+    deadline = None if row["deadline"] is None else row["deadline"] + ahead
+    return Claim(job_of({"has_artifact": False, **row}), deadline, more_wait)
+
+
+_AS_STORED = "id", "kind", "lane", "error", "attempt", "request_id", "key_id"
+_TIMES = "created_at", "started_at", "finished_at"
+
+
+def _summary(row: Row) -> Mapping[str, Any]:
+    times = {name: row[name] for name in _TIMES}
+    return {
+        **{name: row[name] for name in _AS_STORED},
+        **{name: at if at is None else datetime.fromtimestamp(at, UTC) for name, at in times.items()},
+        "status": JobStatus(row["status"]),
+        "progress": progress_of(row),
+        "has_artifact": bool(row["has_artifact"]),
+        "unfinished": row["unfinished"] is not None,
+    }
