@@ -18,8 +18,9 @@ from app.simulation.visit import (
     START,
     arrival_after,
     departure_after,
+    farthest,
+    flown_with_return,
     is_late,
-    is_out_of_range,
     leg,
     way_home,
 )
@@ -134,11 +135,12 @@ def lay(
     flown, clock
         (S+1,) overwritten from ``begin + 1`` on.
     """
+    most = farthest(arrays.voyage[0, i]) - arrays.dis[0, i]
     for s in range(begin, length):
         j = targets[s]
         way = leg(arrays, 0, i, START if s == 0 else targets[s - 1], j)
         flown[s + 1] = flown[s] + way
-        if is_out_of_range(arrays, 0, i, j, arrays.dis[0, i] + flown[s + 1]):
+        if flown_with_return(arrays, 0, i, j, flown[s + 1]) > most:
             return False
         arrival = arrival_after(arrays, 0, i, clock[s], way)
         if is_late(arrival, arrays.deadline[0, j]):
