@@ -26,14 +26,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
-from app.simulation.arrays import Floats, ProblemArrays, compile_problem
+from app.simulation.arrays import Floats, ProblemArrays, alike, compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.simulator import act, end_step, new_episodes, verdict
 from app.simulation.visit import ALLOWED
@@ -102,11 +102,7 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
     per_distance = _RESOLUTION / max(problem.extent, 1e-9)
     per_time = per_distance * float(arrays.speed.mean())
     amounts = 1000 if max(arrays.load.max(), arrays.need.max()) < 1e6 else 1
-    like: list[int] = []
-    seen: dict[Any, int] = {}
-    for i, uav in enumerate(problem.uavs):
-        key = (uav.x_c, uav.y_c, uav.x_s, uav.y_s, uav.speed, uav.voyage - uav.dis, uav.loadlist, uav.ret)
-        like.append(seen.setdefault(key, i))
+    like = alike(arrays).tolist()
     distance, duration, charged = {}, {}, {}
     service = np.zeros((n + 2 * m, n + 2 * m))
     service[:, :n] = arrays.service[0]

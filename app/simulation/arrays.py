@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,22 @@ from app.simulation.distances import between_points
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """Axes of a field of :class:`ProblemArrays` after that of the problems; all that copies arrays asks here.
+
+    Attributes
+    ----------
+    names
+        A letter each: M (UAVs), N (targets), K (materials), in this order, but for NN.
+    padding
+        What a padded UAV or target has.
+    """
+
+    names: str = ""
+    padding: float = 0.0
 
 
 class ProblemArrays(NamedTuple):
@@ -63,26 +80,26 @@ class ProblemArrays(NamedTuple):
         (P,) S.
     """
 
-    start_target: Floats
-    between: Floats
-    home: Floats
-    start_home: Floats
-    speed: Floats
-    voyage: Floats
-    dis: Floats
-    ret: Flags
-    load: Floats
-    need: Floats
-    requested: Floats
-    crumb: Floats
-    need_total: Floats
-    level: Floats
-    deadline: Floats
-    service: Floats
-    weight: Floats
-    return_to_base: Flags
-    charge_return: Flags
-    max_steps: Integers
+    start_target: Annotated[Floats, Axes("MN")]
+    between: Annotated[Floats, Axes("NN")]
+    home: Annotated[Floats, Axes("MN")]
+    start_home: Annotated[Floats, Axes("M")]
+    speed: Annotated[Floats, Axes("M", padding=1.0)]
+    voyage: Annotated[Floats, Axes("M")]
+    dis: Annotated[Floats, Axes("M")]
+    ret: Annotated[Flags, Axes("M", padding=True)]
+    load: Annotated[Floats, Axes("MK")]
+    need: Annotated[Floats, Axes("NK")]
+    requested: Annotated[Floats, Axes("NK")]
+    crumb: Annotated[Floats, Axes()]
+    need_total: Annotated[Floats, Axes("N")]
+    level: Annotated[Floats, Axes("N")]
+    deadline: Annotated[Floats, Axes("N", padding=np.inf)]
+    service: Annotated[Floats, Axes("N")]
+    weight: Annotated[Floats, Axes()]
+    return_to_base: Annotated[Flags, Axes()]
+    charge_return: Annotated[Flags, Axes()]
+    max_steps: Annotated[Integers, Axes()]
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -157,7 +174,48 @@ def _compile(problem: Problem) -> ProblemArrays:
     )
 
 
-_PADDING = {"speed": 1.0, "ret": True, "deadline": np.inf}
+def _axes() -> dict[str, Axes]:
+    hints = get_type_hints(ProblemArrays, include_extras=True)
+    return {name: get_args(hints[name])[1] for name in ProblemArrays._fields}
+
+
+AXES = _axes()
+"""Axes of every field."""
+
+OF_UAVS = tuple(name for name, axes in AXES.items() if axes.names.startswith("M"))
+"""Fields with an axis of UAVs, which is always the second."""
+
+
+def part(arrays: ProblemArrays, uavs: Integers, targets: Integers) -> ProblemArrays:
+    """Return a stack of parts of the first problem of a stack.
+
+    Parameters
+    ----------
+    arrays
+        The stack.
+    uavs, targets
+        (P, M) and (P, N): those that each part has, in their order there.
+    """
+    taken = {"M": uavs, "N": targets}
+    columns = {}
+    for name, axes in AXES.items():
+        column = getattr(arrays, name)
+        some = [taken[axis] for axis in axes.names if axis != "K"]
+        if len(some) == 2:
+            column = column[0][some[0][:, :, None], some[1][:, None, :]]
+        else:
+            column = column[0][some[0]] if some else np.repeat(column[:1], len(uavs))
+        # Compiled code is made anew for every order of memory, and nobody should wait for that.
+        columns[name] = np.ascontiguousarray(column)
+    return ProblemArrays(**columns)
+
+
+def alike(arrays: ProblemArrays) -> Integers:
+    """Return for each UAV of a stack's first problem the first one that is like it in everything, (M,)."""
+    told = np.column_stack([getattr(arrays, name)[0] for name in OF_UAVS])
+    first: dict[bytes, int] = {}
+    # Adding 0 makes one zero of the two.
+    return np.array([first.setdefault(row.tobytes(), i) for i, row in enumerate(told + 0.0)], np.int64)
 
 
 def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
@@ -171,7 +229,7 @@ def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
         At least one.
     """
     columns = zip(ProblemArrays._fields, zip(*problems, strict=True), strict=True)
-    return ProblemArrays(**{name: _pad(arrays, _PADDING.get(name, 0)) for name, arrays in columns})
+    return ProblemArrays(**{name: _pad(arrays, AXES[name].padding) for name, arrays in columns})
 
 
 def _pad(arrays: Sequence[npt.NDArray[Any]], value: float) -> npt.NDArray[Any]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, alike
 from app.simulation.simulator import compiled
 from app.solvers.local_search.routes import NONE, charged_distance
 
@@ -88,7 +88,7 @@ def new_pool(arrays: ProblemArrays, capacity: int = CAPACITY) -> Pool:
     m, n, _ = arrays.shape
     names = np.random.default_rng(_NAMES_SEED).integers(1, 2**62, m + n)
     return Pool(
-        kind=_kinds(arrays),
+        kind=alike(arrays),
         name=names,
         slot=np.full(2 * capacity, NONE, np.int64),
         route_name=np.empty(capacity, np.int64),
@@ -98,19 +98,6 @@ def new_pool(arrays: ProblemArrays, capacity: int = CAPACITY) -> Pool:
         distance=np.empty(capacity),
         size=np.zeros(1, np.int64),
     )
-
-
-def _kinds(arrays: ProblemArrays) -> Integers:
-    """(M,) the first UAV with the same distances, speed, range and load."""
-    told = np.column_stack(
-        [
-            *(arrays.ret[0], arrays.speed[0], arrays.voyage[0], arrays.dis[0], arrays.start_home[0]),
-            *(arrays.load[0], arrays.start_target[0], arrays.home[0]),
-        ]
-    )
-    first: dict[bytes, int] = {}
-    # Adding 0 makes one zero of the two.
-    return np.array([first.setdefault(row.tobytes(), i) for i, row in enumerate(told + 0.0)], np.int64)
 
 
 @compiled

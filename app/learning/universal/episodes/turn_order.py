@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.arrays import Integers, ProblemArrays
-
-_OF_UAVS = ("start_target", "home", "start_home", "speed", "voyage", "dis", "ret", "load")
-"""Fields with an axis of UAVs, always the second."""
+from app.simulation.arrays import OF_UAVS, Integers, ProblemArrays
 
 
 def draw_orders(problems: int, n_uavs: int, rng: np.random.Generator) -> Integers:
@@ -29,7 +26,7 @@ def some_orders(count: int, n_uavs: int, rng: np.random.Generator) -> Integers:
 def reorder(arrays: ProblemArrays, orders: Integers) -> ProblemArrays:
     """Number the UAVs of a stack of P problems by their orders (P, M)."""
     columns = arrays._asdict()
-    for name in _OF_UAVS:
+    for name in OF_UAVS:
         column = columns[name]
         places = orders.reshape(*orders.shape, *(1,) * (column.ndim - 2))
         columns[name] = np.take_along_axis(column, places, axis=1)

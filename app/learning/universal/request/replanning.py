@@ -16,7 +16,7 @@ import numpy as np
 from app.learning.universal.episodes.rollout import exploration, play
 from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, part
 from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, new_episodes, reset_one, verdict
 from app.simulation.visit import ALLOWED, START, cost_of, earned_by, leg
@@ -101,31 +101,8 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
     row = np.arange(count)[:, None]
     worthwhile = worth[row, targets] > -np.inf
     need = episodes.need[row, targets]
-    pairs = (uavs[:, :, None], targets[:, None, :])
-    left = ProblemArrays(
-        start_target=arrays.start_target[0][pairs],
-        between=arrays.between[0][targets[:, :, None], targets[:, None, :]],
-        home=arrays.home[0][pairs],
-        start_home=arrays.start_home[0][uavs],
-        speed=arrays.speed[0][uavs],
-        voyage=arrays.voyage[0][uavs],
-        dis=arrays.dis[0][uavs],
-        ret=arrays.ret[0][uavs] | ~groups[row, uavs],
-        load=arrays.load[0][uavs],
-        need=np.where(worthwhile[:, :, None], need, 0.0),
-        requested=arrays.requested[0][targets],
-        crumb=np.repeat(arrays.crumb, count),
-        need_total=arrays.need_total[0][targets],
-        level=arrays.level[0][targets],
-        deadline=arrays.deadline[0][targets],
-        service=arrays.service[0][targets],
-        weight=np.repeat(arrays.weight, count),
-        return_to_base=np.repeat(arrays.return_to_base, count),
-        charge_return=np.repeat(arrays.charge_return, count),
-        max_steps=np.repeat(arrays.max_steps, count),
-    )
-    # Compiled code is made anew for every order of memory, and nobody should wait for that.
-    left = ProblemArrays(**{name: np.ascontiguousarray(each) for name, each in left._asdict().items()})
+    left = part(arrays, uavs, targets)
+    left = left._replace(ret=left.ret | ~groups[row, uavs], need=np.where(worthwhile[:, :, None], need, 0.0))
     return Residual(left, np.ascontiguousarray(uavs), np.ascontiguousarray(targets))
 
 
