@@ -113,10 +113,7 @@ def test_units_do_not_matter():
 
 def test_where_nothing_can_be_done_the_bound_is_what_staying_at_home_earns():
     problem = generate("mid_mission", 3, 3, 2, np.random.default_rng(1))
-    uavs = tuple(
-        type(u)(u.id, u.x_s, u.y_s, u.x_c, u.y_c, u.speed, 0.0, u.loadlist, u.dis, False)
-        for u in problem.uavs
-    )
+    uavs = tuple(replace(uav, voyage=0.0, ret=False) for uav in problem.uavs)
     for charged in (False, True):
         stuck = Problem(uavs, problem.targets, objective=Objective(1.0, charge_return=charged))
         reward = reward_of(stuck, greedy_plan(stuck))
