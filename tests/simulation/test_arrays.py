@@ -13,7 +13,7 @@ SIZES = {"M": 4, "N": 6, "K": 2}
 
 @pytest.fixture
 def problem():
-    made = generate("mid-mission", *SIZES.values(), np.random.default_rng(5))
+    made = generate("mid_mission", *SIZES.values(), np.random.default_rng(5))
     return replace(made, objective=replace(made.objective, distance_weight=0.5))
 
 
