@@ -1,4 +1,4 @@
-"""Who may start: lanes share the workers so that what somebody waits for is not behind the rest."""
+"""Which jobs may start: lanes share the workers, so that nobody waits behind work that can wait."""
 
 from __future__ import annotations
 

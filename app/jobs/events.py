@@ -114,7 +114,7 @@ class JobEvents:
 
 
 class EventStreams:
-    """The events of the jobs that run, and of those that somebody listens to: kept by whoever has them.
+    """The events of the jobs that run, and of those with listeners, as long as something refers to them.
 
     One who comes after the end finds the job in the table, and nothing is held in memory for it.
 

@@ -20,6 +20,8 @@ _TICK_S = 0.25
 _SAVE_INTERVAL_S = 1.0
 _LOOK_INTERVAL_S = 15.0
 _EXPIRE_INTERVAL_S, _EXPIRED_AT_ONCE = 600.0, 50
+_AGAIN_S = 1.0
+_FAILURE = "the job table could not be kept in order"
 
 _log = logging.getLogger(__name__)
 
@@ -69,14 +71,22 @@ class Maintenance:
         }
         self._every_s = {chore: every_s for chore, every_s in chores.items() if every_s < math.inf}
         self._due_at = dict.fromkeys(self._every_s, 0.0)
-        self.loop = Loop(self._do_what_is_due, "the job table could not be kept in order")
+        self.loop = Loop(self._do_what_is_due, _FAILURE)
 
     async def _do_what_is_due(self) -> float:
-        """Do what is due, and return the seconds until something is again."""
+        """Do what is due, and return the seconds until something is again.
+
+        What fails is tried again soon, and keeps nothing else from being done: without heartbeats the others
+        would take this service for dead.
+        """
         for chore, every_s in self._every_s.items():
             if time.monotonic() >= self._due_at[chore] and not self.loop.ended:
                 self._due_at[chore] = time.monotonic() + every_s
-                await chore()
+                try:
+                    await chore()
+                except Exception:
+                    _log.exception("%s; there will be another try", _FAILURE)
+                    self._due_at[chore] = time.monotonic() + _AGAIN_S
         return max(0.0, min(self._due_at.values()) - time.monotonic())
 
     async def recover(self) -> None:
@@ -128,11 +138,10 @@ class Maintenance:
                 self._dispatcher.moved(job)
 
     async def _expire(self) -> None:
-        """Delete ended jobs that are too old, some at a time, so that nobody waits long to write."""
+        """Delete some of the ended jobs that are too old; if there may be more, heartbeats come between."""
         before = self._store.clock.now() - (self._retention_s or 0.0)
-        gone, last = 0, _EXPIRED_AT_ONCE
-        while last == _EXPIRED_AT_ONCE and not self.loop.ended:
-            last = await self._writer.write(self._store.expire, before, _EXPIRED_AT_ONCE)
-            gone += last
+        gone = await self._writer.write(self._store.expire, before, _EXPIRED_AT_ONCE)
+        if gone == _EXPIRED_AT_ONCE:
+            self._due_at[self._expire] = time.monotonic()
         if gone:
             _log.info("jobs of long ago were deleted", extra={"jobs": gone})

@@ -129,8 +129,8 @@ class PostgresPeers(NoPeers):
     def beat(self) -> dict[str, OwnedJob]:
         """Show that this service lives, and return the jobs that the table says it runs, by their id.
 
-        After a time in which it could not, the others could not either: nobody is judged until all who live
-        have had the time of a lease to show themselves.
+        After a time in which it could not, the others could not either: no service counts as dead until all
+        that live have had the time of a lease to show themselves.
         """
         begun = self._clock()
         me, mine = owners.c.owner == self._owner, jobs.c.owner == self._owner

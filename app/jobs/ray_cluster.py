@@ -235,7 +235,7 @@ class RayWorker:
         worker.warm_up(*arguments)
 
     def stay(self) -> None:
-        """Never return: whoever waits for it learns that this process has died."""
+        """Never return: a caller that waits for it learns that this process has died."""
         threading.Event().wait()
 
     def run(

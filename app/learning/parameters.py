@@ -10,6 +10,7 @@ so that what an answer says was used can be asked for again.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -171,9 +172,9 @@ class _ModalParameters(Parameters):
                 object.__setattr__(self, name, value)
         return self
 
+    @abstractmethod
     def table(self) -> TableParameters:
         """Return what Algorithm 1 is run with; service mode does so where its own networks cannot be used."""
-        raise NotImplementedError
 
     def in_paper(self) -> Self:
         """Return what paper mode is run with."""

@@ -128,13 +128,13 @@ class UnreadableIsMissing(caching.IndexDataCacheFile):
         """Return the entry of a key; None where there is none that can be read."""
         try:
             return super().load(key)  # type: ignore[no-untyped-call]  # untyped in numba
-        except Exception:
+        except Exception:  # what stands in the file decides what reading it raises
             return None
 
     def _load_index(self) -> Any:
         try:
             return super()._load_index()  # type: ignore[no-untyped-call]  # untyped in numba
-        except Exception:
+        except Exception:  # as above
             return {}
 
 
