@@ -13,7 +13,6 @@ from typing import Annotated, Literal, get_args
 
 from app.domain.errors import InvalidProblem
 from app.domain.field_checks import Look, look_at, violations_of, without_tiny
-from app.domain.fields import MAX_MAGNITUDE as MAX_MAGNITUDE  # noqa: PLC0414 - limits of a problem, exported from here
 from app.domain.fields import (
     MIN_MAGNITUDE,
     Amounts,

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.domain.errors import InvalidProblem
+from app.domain.fields import MAX_MAGNITUDE
 from app.domain.geometry import distance, distances
 from app.domain.plan import Plan
-from app.domain.problem import MAX_MAGNITUDE, UAV, Objective, Problem, Target
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_from_record, problem_to_record
 
 BASE = Problem(

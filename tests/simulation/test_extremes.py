@@ -8,7 +8,8 @@ from cases import problem_of
 from problems import random_problem
 from referee import replay
 
-from app.domain.problem import MAX_MAGNITUDE, MIN_MAGNITUDE, UAV, Objective, Problem, Target
+from app.domain.fields import MAX_MAGNITUDE, MIN_MAGNITUDE
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.learning.universal.episodes.observation import look, new_gains, observe
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
