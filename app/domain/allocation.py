@@ -59,8 +59,16 @@ class UnmetCode(StrEnum):
     """Why a rescue area does not get all it needs, from what no plan could change to what another would."""
 
     NO_SUPPLY = "no_supply"
+    SKILLS = "skills"
+    EXCLUDED = "excluded"
+    NO_FLY_ZONE = "no_fly_zone"
+    WIND = "wind"
     OUT_OF_RANGE = "out_of_range"
     DEADLINE = "deadline"
+    ENDURANCE = "endurance"
+    TOO_EARLY_TO_WAIT = "too_early_to_wait"
+    AVAILABLE_UNTIL = "available_until"
+    COMMITTED = "committed"
     STEP_LIMIT = "step_limit"
     RANGE_USED = "range_used"
     TIME_USED = "time_used"
@@ -76,8 +84,16 @@ class UnmetCode(StrEnum):
 
 _MEANINGS = {
     UnmetCode.NO_SUPPLY: "No UAV that can be sent carries any of what it still needs.",
+    UnmetCode.SKILLS: "No UAV that carries any of it has all the skills that the area asks for.",
+    UnmetCode.EXCLUDED: "Every UAV that carries any of it must not be sent there.",
+    UnmetCode.NO_FLY_ZONE: "No way leads there, or home from there, round the no-fly zones.",
+    UnmetCode.WIND: "The wind is too strong to fly there, or home from there.",
     UnmetCode.OUT_OF_RANGE: "No UAV that carries any of it has the range to fly there, not even directly.",
     UnmetCode.DEADLINE: "No UAV with any of it and the range is there in time, not even directly.",
+    UnmetCode.ENDURANCE: "A UAV that could bring some of it would be in the air for too long.",
+    UnmetCode.TOO_EARLY_TO_WAIT: "A UAV that could bring some of it cannot stay in the air until the area opens.",
+    UnmetCode.AVAILABLE_UNTIL: "A UAV that could bring some of it would land too late.",
+    UnmetCode.COMMITTED: "The UAVs that could bring some of it are committed to other visits first.",
     UnmetCode.STEP_LIMIT: "A UAV has some of it left over and lacks only a decision step for one more visit.",
     UnmetCode.RANGE_USED: "A UAV has some of it left over, but its other visits leave it too little range.",
     UnmetCode.TIME_USED: "A UAV has some of it left over, but its other visits leave too little time.",

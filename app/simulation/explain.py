@@ -9,7 +9,7 @@ import numpy as np
 from app.domain.allocation import Allocation, Route, Stop
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation import simulator
+from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.evaluation import replayed
@@ -92,7 +92,8 @@ def _trace(
             if j == arrays.level.shape[1]:
                 continue
             legs[s, i] = simulator.leg_to(arrays, episodes, 0, i, j)
-            arrivals[s, i] = episodes.clock[0, i] + legs[s, i] / arrays.speed[0, i]
+            time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, legs[s, i])
+            arrivals[s, i] = episodes.clock[0, i] + time
             if planned:
                 simulator.deliver(arrays, episodes, i, j, delivered, s)
                 continue

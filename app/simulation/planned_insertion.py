@@ -154,7 +154,8 @@ def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: P
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     episodes, length = trial.episodes, plan.visits.length[i]
     episodes.at[0, i] = visit.START
-    episodes.flown[0, i], episodes.clock[0, i] = arrays.dis[0, i], 0.0
+    episodes.flown[0, i], episodes.clock[0, i] = arrays.dis[0, i], visit.ready(arrays, 0, i)
+    episodes.aloft[0, i], episodes.visits[0, i] = visit.airborne(arrays, 0, i), 0
     steps, whole = 0, True
     # Number s, then the additional visit where it comes before it.
     for q in range(2 * length + 1):

@@ -16,13 +16,14 @@ from app.simulation.simulator import (
     Episodes,
     act,
     compiled,
+    earned_now,
     end_step,
     leg_home,
     leg_to,
     new_episodes,
     verdict,
 )
-from app.simulation.visit import ALLOWED, cost_of, earned_by, way_home
+from app.simulation.visit import ALLOWED, cost_of, most_earned_by, way_home
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.stop import never
@@ -114,14 +115,14 @@ def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int)
         if arrays.charge_return[0]:
             way += way_home(arrays, 0, i, j) - back
         cost = cost_of(arrays, 0, way)
-        if earned_by(arrays, 0, j, most) - cost <= best:
+        if most_earned_by(arrays, 0, j, most) - cost <= best:
             continue
         if verdict(arrays, episodes, 0, i, j) != ALLOWED:
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
             unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
-        gain = earned_by(arrays, 0, j, unloaded)
+        gain = earned_now(arrays, episodes, 0, i, j, unloaded)
         earned = gain - cost
         # Of equals the first, whatever rounding makes of them.
         if earned > best + _ROUNDING * gain:

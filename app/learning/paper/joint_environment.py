@@ -43,6 +43,8 @@ def _copy(episodes: Episodes, source: int, scratch: Episodes, row: int) -> None:
         scratch.at[row, i] = episodes.at[source, i]
         scratch.flown[row, i] = episodes.flown[source, i]
         scratch.clock[row, i] = episodes.clock[source, i]
+        scratch.aloft[row, i] = episodes.aloft[source, i]
+        scratch.visits[row, i] = episodes.visits[source, i]
         scratch.ret[row, i] = episodes.ret[source, i]
         for k in range(episodes.load.shape[2]):
             scratch.load[row, i, k] = episodes.load[source, i, k]

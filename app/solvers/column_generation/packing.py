@@ -22,6 +22,7 @@ import highspy
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.visit import decays, has_closing_cost
 from app.solvers.column_generation.pool import Pool
 from app.solvers.highs import QuietHighs
 from app.solvers.protocol import StopCriterion
@@ -248,7 +249,8 @@ def _steps(arrays: ProblemArrays) -> tuple[float, float]:
     Where distance is free, whole routes earn a sum of levels; most are written in steps of some size.
     """
     levels, largest = arrays.level[0][arrays.need_total[0] > 0], largest_level(arrays)
-    grain = _common_measure(levels, 1e-9 * largest) if arrays.weight[0] == 0.0 else 0.0
+    counted = arrays.weight[0] == 0.0 and not decays(arrays, 0) and not has_closing_cost(arrays, 0)
+    grain = _common_measure(levels, 1e-9 * largest) if counted else 0.0
     return largest, grain if grain >= _LEAST_GRAIN * largest else 0.0
 
 

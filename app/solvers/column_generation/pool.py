@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, alike
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays, alike
 from app.simulation.simulator import compiled
-from app.solvers.local_search.routes import NONE, charged_distance
+from app.solvers.local_search.routes import charged_distance
 
 CAPACITY = 8192
 """Routes that a pool holds at most; a full one takes no more."""

@@ -84,7 +84,7 @@ class Pricing:
         self._kinds: list[tuple[int, int, VehicleResources]] = []
         self._labels: dict[int, Labels] = {}
         steps = int(arrays.max_steps[0])
-        self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
+        self._scratch = np.empty(steps, np.int64), *(np.empty(steps + 1) for _ in range(3))
         self._worth = worth(arrays)
         self._gain = _GAIN * float(self._worth.max(initial=0.0))
         self._idle, self._effort = idle_cost(arrays), effort

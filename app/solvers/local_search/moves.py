@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Flags, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.simulation.visit import START, cost_of, earned_by, leg, way_home
 from app.solvers.local_search.change import Change, propose
-from app.solvers.local_search.routes import NONE, Routes
+from app.solvers.local_search.routes import Routes
 
 NEAR = 24
 """Length of the lists of near targets."""
@@ -50,7 +50,7 @@ def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     """Make the lists for the first problem of a stack; ``active`` or ``wanted`` may be empty."""
     wanted = np.flatnonzero(arrays.need_total[0] > 0)
     length = max(1, min(NEAR, len(wanted) - 1))
-    between = arrays.between[0].copy()
+    between = arrays.between[0].min(axis=0)
     np.fill_diagonal(between, np.inf)
     near_start = _nearest(arrays.start_target[0], wanted, length)
     reluctant = np.zeros(len(near_start), np.bool_)
