@@ -17,6 +17,7 @@ from pydantic import BaseModel, Discriminator, FailFast, Tag, TypeAdapter, Valid
 
 from app.api.errors import InvalidBody
 from app.api.problem_details import MAX_LISTED_ERRORS, FieldError
+from app.domain.errors import escaped
 from app.field_errors import in_words
 from app.settings import Settings
 
@@ -47,7 +48,7 @@ class _Found:
             location = item["loc"]
             if location and location[0] in known:
                 continue
-            pointer = at + "".join(f"/{_escaped(step)}" for step in location)
+            pointer = at + "".join(f"/{escaped(step)}" for step in location)
             self.errors.append(FieldError(pointer=pointer, detail=in_words(item, list(model.model_fields))))
             if len(self.errors) == MAX_LISTED_ERRORS:
                 raise _EnoughErrors
@@ -190,7 +191,3 @@ def _model_for(declared: Any, body: Any) -> type[BaseModel]:
         errors = [FieldError(pointer="", detail=in_words(item)) for item in error.errors(include_url=False)]
         raise InvalidBody(errors) from None
     raise AssertionError("a body of no form was taken")  # pragma: no cover
-
-
-def _escaped(step: str | int) -> str:
-    return str(step).replace("~", "~0").replace("/", "~1")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
-from app.domain import fields, text_fields
+from app.domain import fields, text_fields, world_fields
 from app.domain.fields import MAX_MAGNITUDE, DeclaredField, Kind, declared_fields
 from app.domain.identifiers import ID_PATTERN, MAX_ID_LENGTH
 from app.domain.records import from_values
@@ -26,6 +26,8 @@ def _without_point(given: object) -> object:
 
 Whole = Annotated[int, BeforeValidator(_without_point)]
 """An integer as JSON Schema has it: 1.0 is one too, which is what some languages write."""
+Coordinate = Annotated[float, Field(ge=-MAX_MAGNITUDE, le=MAX_MAGNITUDE)]
+"""What it may be on the globe is a rule between fields."""
 Identifier = Annotated[
     str,
     # The domain checks the pattern, and names the character that breaks it.
@@ -57,7 +59,9 @@ def _definition(field: DeclaredField) -> tuple[Any, Any]:
     if isinstance(kind, fields.Part):
         empty = list if isinstance(kind, fields.Items) else needed
         return needed, Field(default_factory=empty, description=field.sentence)
-    return needed, Field(default=kind.to_record(field.default), description=field.sentence)
+    # An empty tuple is an empty list to JSON; a list would be copied for every item.
+    default = kind.to_record(field.default) if field.default != () else ()
+    return needed, Field(default=default, description=field.sentence)
 
 
 def _is_filled_in(kind: Kind) -> bool:
@@ -68,8 +72,8 @@ def _is_filled_in(kind: Kind) -> bool:
 def _type_of(kind: Kind) -> Any:
     """Return the type that a kind has in a request."""
     match kind:
-        case fields.Number(low=low, high=high):
-            return Annotated[float, Field(ge=low, le=high)]
+        case fields.Number(low=low, high=high, below=below):
+            return Annotated[float, Field(ge=low, lt=high) if below else Field(ge=low, le=high)]
         case fields.Amounts():
             amount = Annotated[float, Field(ge=0, le=MAX_MAGNITUDE)]
             return Annotated[list[amount], Field(min_length=1)]
@@ -85,11 +89,25 @@ def _type_of(kind: Kind) -> Any:
             return list[Identifier]
         case text_fields.Properties():
             return dict[str, Any]
+        case world_fields.Corners():
+            return _list_of(_list_of(Coordinate, 2, 2), world_fields.FEWEST_CORNERS)
+        case world_fields.JointActions():
+            return _list_of(_list_of(_whole(0, int(MAX_MAGNITUDE))))
+        case world_fields.Table():
+            return _list_of(_list_of(Annotated[float, Field(ge=0, le=MAX_MAGNITUDE)] | None), 1)
+        case fields.Named(of=of):
+            return Annotated[dict[Identifier, wire_model(of)], Field(min_length=1)]  # type: ignore[misc]  # made here
         case fields.Items(of=of, least=least):
             return Annotated[list[wire_model(of)], Field(min_length=least)]  # type: ignore[misc]  # made here
         case fields.Part(of=of):
             return wire_model(of)
     raise TypeError(f"no type of a request is known for {kind}")
+
+
+def _list_of(item: Any, least: int = 0, most: int | None = None) -> Any:
+    """Return the type of a list that may be long: it is checked up to the first fault."""
+    limits = Field(min_length=least or None, max_length=most, fail_fast=True)
+    return Annotated[list[item], limits]
 
 
 def _whole(low: int, high: int) -> Any:
@@ -111,6 +129,8 @@ def from_wire(model: BaseModel, of: type) -> Any:
         match each.kind:
             case fields.Items(of=item):
                 values[each.name] = tuple(_items_from_wire(value, item))
+            case fields.Named(of=part) if value is not None:
+                values[each.name] = {name: from_wire(one, part) for name, one in value.items()}
             case fields.Part(of=part) if value is not None:
                 values[each.name] = from_wire(value, part)
             case kind:
@@ -120,20 +140,24 @@ def from_wire(model: BaseModel, of: type) -> Any:
 
 def _items_from_wire(models: Sequence[BaseModel], of: type) -> list[Any]:
     """Turn the models of a list into the dataclass; field by field, which is quicker than item by item."""
-    items = [model.__dict__.copy() for model in models]
+    # Most fields have their defaults, which the constructor knows.
+    items = [
+        {name: values[name] for name in model.model_fields_set}
+        for model, values in zip(models, map(vars, models), strict=True)
+    ]
     for each in declared_fields(of):
         name, same_as = each.name, getattr(each.kind, "same_as", None)
         if isinstance(each.kind, fields.Identifier):
             for place, item in enumerate(items, 1):
-                if item[name] is None:
+                if item.get(name) is None:
                     item[name] = each.kind.by_place(place)
         elif same_as and each.optional:
             # What is the default is the same problem, written out or not.
             for item in items:
-                if item[name] is not None and item[name] == item[same_as]:
+                if item.get(name) is not None and item[name] == item.get(same_as):
                     item[name] = None
         elif same_as:
             for item in items:
-                if item[name] is None:
+                if item.get(name) is None:
                     item[name] = item[same_as]
     return from_values(items, of)

@@ -28,6 +28,11 @@ class Violation:
     detail: str
 
 
+def escaped(step: str | int) -> str:
+    """Write a name or an index as a step of a JSON pointer."""
+    return str(step).replace("~", "~0").replace("/", "~1")
+
+
 class AllocatorError(Exception):
     """Root of the tree: a message, and facts that a program can read.
 

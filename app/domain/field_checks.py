@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.errors import Violation
+from app.domain.errors import Violation, escaped
 from app.domain.fields import (
     MIN_MAGNITUDE,
     Amounts,
@@ -26,6 +26,7 @@ from app.domain.fields import (
     Identifier,
     Items,
     Kind,
+    Named,
     Number,
     Part,
     declared_fields,
@@ -33,6 +34,9 @@ from app.domain.fields import (
 from app.domain.identifiers import fault_of
 
 Floats = npt.NDArray[np.float64]
+
+_Column = tuple[DeclaredField, Callable[[Any], Any]]
+"""A field, and what gets its value of an item."""
 
 
 class Look(IntEnum):
@@ -52,12 +56,12 @@ def look_at(items: Sequence[Any], of: type, context: Context) -> Look:
     found, (numbers, values_of, others) = Look.SOUND, _columns(of)
     if numbers:
         found = _look_at_numbers(list(map(values_of, items)), *_limits(of, context.crs == "wgs84"))
-    for each in others:
+    for each, value_of in others:
         if found is Look.WRONG:
             return Look.WRONG
-        values = list(map(attrgetter(each.name), items))
-        if each.optional:
-            values = [value for value in values if value is not None]
+        # Defaults are sound, and most fields have theirs.
+        default = each.default
+        values = [value for value in map(value_of, items) if value is not default and value is not None]
         if values:
             found = max(found, _look_at_values(values, each.kind, context))
     rules = getattr(of, "broken_rules", None)
@@ -67,13 +71,13 @@ def look_at(items: Sequence[Any], of: type, context: Context) -> Look:
 
 
 @cache
-def _columns(of: type) -> tuple[list[DeclaredField], Callable[[Any], tuple[Any, ...]], list[DeclaredField]]:
+def _columns(of: type) -> tuple[list[DeclaredField], Callable[[Any], tuple[Any, ...]], list[_Column]]:
     """Return the fields that are always a number, what gets their values, and all other fields."""
     declared = declared_fields(of)
     numbers = [each for each in declared if isinstance(each.kind, Number) and not each.optional]
     names = [each.name for each in numbers]
     values_of = attrgetter(*names) if len(names) > 1 else lambda item: tuple(getattr(item, n) for n in names)
-    others = [each for each in declared if each not in numbers]
+    others: list[_Column] = [(each, attrgetter(each.name)) for each in declared if each not in numbers]
     return numbers, values_of, others
 
 
@@ -95,11 +99,15 @@ def _look_at_values(values: list[Any], kind: Kind, context: Context) -> Look:
             return Look.WRONG
         return _look_at_numbers([list(chain.from_iterable(values))], *kind.limits(context))
     if isinstance(kind, Identifier):
-        sound = len(set(values)) == len(values) and not any(map(fault_of, values))
+        sound = not (kind.unique and len(set(values)) < len(values)) and not any(map(fault_of, values))
     elif isinstance(kind, Items):
         if any(len(value) < kind.least for value in values):
             return Look.WRONG
         return look_at(list(chain.from_iterable(values)), kind.of, context)
+    elif isinstance(kind, Named):
+        if any(True for value in values for _ in kind.violations("", value, context)):
+            return Look.WRONG
+        return look_at([part for value in values for part in value.values()], kind.of, context)
     elif isinstance(kind, Part):
         return look_at(values, kind.of, context)
     else:
@@ -142,6 +150,9 @@ def violations_of(item: Any, at: str, context: Context) -> Iterator[Violation]:
         yield from each.kind.violations(pointer, value, context)
         if isinstance(each.kind, Items):
             yield from _violations_of_items(value, pointer, each.kind, context)
+        elif isinstance(each.kind, Named):
+            for name, part in value.items():
+                yield from violations_of(part, f"{pointer}/{escaped(name)}", context)
         elif isinstance(each.kind, Part):
             yield from violations_of(value, pointer, context)
     rules = getattr(item, "broken_rules", None)
@@ -152,7 +163,8 @@ def violations_of(item: Any, at: str, context: Context) -> Iterator[Violation]:
 def _violations_of_items(items: Sequence[Any], at: str, kind: Items, context: Context) -> Iterator[Violation]:
     if len(items) < kind.least:
         yield Violation(at, f"{len(items)} {kind.called}; at least {kind.least} is needed")
-    named = [each.name for each in declared_fields(kind.of) if isinstance(each.kind, Identifier)]
+    declared = declared_fields(kind.of)
+    named = [each.name for each in declared if isinstance(each.kind, Identifier) and each.kind.unique]
     first: dict[str, int] = {}
     for index, item in enumerate(items):
         for name in named:

@@ -2,8 +2,9 @@
 
 A field of :mod:`app.domain.problem` is declared as ``Annotated[type, kind, "sentence"]``, and nowhere else.
 Its check, its record, its place in a request, its column in files and its row in the reference follow from
-that. This module has the kinds there are, :mod:`app.domain.text_fields` those of texts, and
-:mod:`app.domain.field_checks` applies them to whole problems.
+that. This module has most kinds, :mod:`app.domain.text_fields` those of texts,
+:mod:`app.domain.world_fields` those of zones, plans and tables. :mod:`app.domain.field_checks` applies them
+to whole problems.
 """
 
 from __future__ import annotations
@@ -82,20 +83,26 @@ class Number(Kind):
         Its unit, where it has one.
     same_as
         Name of the field whose value it has where a request leaves it out.
+    below
+        Whether the upper limit itself is not allowed.
     """
 
     low: float = -MAX_MAGNITUDE
     high: float = MAX_MAGNITUDE
     unit: Unit | None = None
     same_as: str | None = None
+    below: bool = False
 
     def limits(self, context: Context) -> tuple[float, float]:  # noqa: ARG002 - of a coordinate they depend on it
         """Return the smallest and the largest number that is allowed."""
-        return self.low, self.high
+        return self.low, math.nextafter(self.high, -math.inf) if self.below else self.high
 
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:
         """Yield what is wrong with the number."""
-        yield from _out_of_limits(pointer, value, *self.limits(context))
+        if self.below and math.isfinite(value) and not self.low <= value < self.high:
+            yield Violation(pointer, f"{written(value)} is not from {self.low:g} to below {self.high:g}")
+            return
+        yield from out_of_limits(pointer, value, *self.limits(context))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +146,7 @@ class Amounts(Kind):
         if materials is not None and len(value) != materials:
             yield Violation(pointer, f"{len(value)} amounts, but the first UAV carries {materials} materials")
         for k, amount in enumerate(value):
-            yield from _out_of_limits(f"{pointer}/{k}", amount, *self.limits(context))
+            yield from out_of_limits(f"{pointer}/{k}", amount, *self.limits(context))
 
     @property
     def conversions(self) -> tuple[Conversion, Conversion] | None:
@@ -149,10 +156,19 @@ class Amounts(Kind):
 
 @dataclass(frozen=True)
 class Whole(Kind):
-    """A whole number within limits."""
+    """A whole number within limits.
+
+    Attributes
+    ----------
+    low, high
+        The limits, which are allowed themselves.
+    same_as
+        Name of the field whose value None stands for.
+    """
 
     low: int
-    high: int
+    high: int = int(MAX_MAGNITUDE)
+    same_as: str | None = None
 
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
         """Yield what is wrong with the number."""
@@ -193,15 +209,18 @@ class Choice(Kind):
 
 @dataclass(frozen=True)
 class Identifier(Kind):
-    """A name that only one item of a list has.
+    """A name of an item of a list.
 
     Attributes
     ----------
     stem
         Items without one are named by it and their place in the list, from 1.
+    unique
+        Whether only one item of the list may have it.
     """
 
     stem: str
+    unique: bool = True
 
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
         """Yield the character that is at fault; the list it stands in says whether it is unique."""
@@ -237,6 +256,40 @@ class Items(Part):
     least: int = 0
 
 
+@dataclass(frozen=True)
+class Named(Part):
+    """Objects with declared fields of their own, by names that are a client's.
+
+    Attributes
+    ----------
+    called
+        What they are called where they are counted.
+    """
+
+    called: str = ""
+
+    def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
+        """Yield that there are none, and the names that could not be an identifier."""
+        if not value:
+            yield Violation(pointer, f"0 {self.called}; at least 1 is needed")
+        for name in value:
+            fault = fault_of(name)
+            if fault is not None:
+                yield Violation(pointer, fault)
+
+
+@dataclass(frozen=True)
+class AlwaysRecorded:
+    """Marks a field that records have also where it has its default.
+
+    Others are left out there, so that what a problem does not use leaves no trace: its record is the one that
+    was written before there was such a field. So the default of a field without the mark never changes.
+    """
+
+
+ALWAYS_RECORDED = AlwaysRecorded()
+
+
 @dataclass(frozen=True, slots=True)
 class DeclaredField:
     """A field as it is declared.
@@ -253,6 +306,8 @@ class DeclaredField:
         Whether None is a value of it.
     default
         What it is where nothing is said; ``MISSING`` where something must be.
+    always_recorded
+        Whether records have it also where it has its default.
     """
 
     name: str
@@ -260,6 +315,7 @@ class DeclaredField:
     sentence: str
     optional: bool
     default: Any
+    always_recorded: bool
 
 
 @cache
@@ -282,7 +338,8 @@ def _declared(of: type, name: str, hint: Any, default: Any) -> DeclaredField:
         sentences = [each for each in about if isinstance(each, str)]
         if len(kinds) == len(sentences) == 1:
             optional = get_origin(inner) in (Union, types.UnionType) and type(None) in get_args(inner)
-            return DeclaredField(name, kinds[0], sentences[0], optional, default)
+            always = default is MISSING or ALWAYS_RECORDED in about
+            return DeclaredField(name, kinds[0], sentences[0], optional, default, always)
     raise TypeError(f"{of.__name__}.{name} has no kind, or no sentence, or several: {hint}")
 
 
@@ -291,7 +348,8 @@ def _default(of_dataclass: Any) -> Any:
     return of_dataclass.default if factory is MISSING else factory()
 
 
-def _out_of_limits(pointer: str, value: float, low: float, high: float) -> Iterator[Violation]:
+def out_of_limits(pointer: str, value: float, low: float, high: float) -> Iterator[Violation]:
+    """Yield that a number is not finite, or beyond its limits."""
     if not math.isfinite(value):
         yield Violation(pointer, f"{value} is not a finite number")
     elif not low <= value <= high:

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from app.domain.errors import InvalidProblem
 from app.domain.field_checks import Look, look_at, violations_of, without_tiny
 from app.domain.fields import (
+    ALWAYS_RECORDED,
     MIN_MAGNITUDE,
     Amounts,
     Choice,
@@ -22,6 +23,7 @@ from app.domain.fields import (
     Flag,
     Identifier,
     Items,
+    Named,
     Number,
     Part,
     Whole,
@@ -29,7 +31,10 @@ from app.domain.fields import (
     written,
 )
 from app.domain.geometry import distance, longitude_stretch
+from app.domain.matrices import Matrix, longest_leg
+from app.domain.text_fields import Name, Properties, Words
 from app.domain.units import DISTANCE, SPEED, TIME, X, Y
+from app.domain.world_fields import Corners, JointActions
 
 Crs = Literal["local", "wgs84"]
 Unloading = Literal["greedy", "planned"]
@@ -62,13 +67,63 @@ class UAV:
     y_c: Annotated[float, Coordinate(axis=Y, same_as="y_s"), "Current position; default: the starting point"]
     speed: Annotated[float, Number(low=MIN_MAGNITUDE, unit=SPEED), f"Average speed: {SPEED}"]
     voyage: Annotated[float, Number(low=0.0, unit=DISTANCE), f"Maximum range of one flight, in {DISTANCE}"]
-    dis: Annotated[float, Number(low=0.0, unit=DISTANCE), "Distance already flown"] = field(
+    dis: Annotated[float, Number(low=0.0, unit=DISTANCE), "Distance already flown", ALWAYS_RECORDED] = field(
         default=0.0, kw_only=True
     )
-    ret: Annotated[bool, Flag(digit=True), "1 when it is returning: it gets no more tasks"] = field(
-        default=False, kw_only=True
-    )
+    ret: Annotated[
+        bool, Flag(digit=True), "1 when it is returning: it gets no more tasks", ALWAYS_RECORDED
+    ] = field(default=False, kw_only=True)
     loadlist: Annotated[tuple[float, ...], Amounts(), "Amounts carried, one a material"]
+    endurance: Annotated[
+        float | None,
+        Number(low=MIN_MAGNITUDE, unit=TIME),
+        "Longest time in the air in one flight, waiting and unloading included; default: no limit",
+    ] = field(default=None, kw_only=True)
+    airborne: Annotated[
+        float, Number(low=0.0, unit=TIME), "Time already in the air in this flight, as `dis` is for distance"
+    ] = field(default=0.0, kw_only=True)
+    reserve: Annotated[
+        float,
+        Number(low=0.0, high=1.0, below=True),
+        "Share of `voyage` and of `endurance` that must be left after landing",
+    ] = field(default=0.0, kw_only=True)
+    available_from: Annotated[
+        float, Number(low=0.0, unit=TIME), "Its clock at the start: it takes off no sooner"
+    ] = field(default=0.0, kw_only=True)
+    available_until: Annotated[
+        float | None, Number(unit=TIME), "Latest time to have landed; default: no limit"
+    ] = field(default=None, kw_only=True)
+    capacity: Annotated[
+        float | None,
+        Number(low=0.0),
+        "Most weight that it carries, in the unit of the weights of `materials`; default: no limit",
+    ] = field(default=None, kw_only=True)
+    skills: Annotated[tuple[str, ...], Words(), "What it can do, in words of your own"] = field(
+        default=(), kw_only=True
+    )
+    excluded: Annotated[
+        tuple[str, ...], Words(ids_of="targets"), "Ids of areas that it must not be sent to"
+    ] = field(default=(), kw_only=True)
+    committed: Annotated[
+        tuple[str, ...],
+        Words(ids_of="targets"),
+        "Ids of areas that it visits first, in this order: promised, or under way",
+    ] = field(default=(), kw_only=True)
+    location: Annotated[int | None, Whole(0), "Where it is, as a row of the `matrices`; needed with them"] = (
+        field(default=None, kw_only=True)
+    )
+    home_location: Annotated[
+        int | None, Whole(0, same_as="location"), "Its starting point as a row of the `matrices`"
+    ] = field(default=None, kw_only=True)
+    profile: Annotated[
+        str | None, Name(), "Which of the `matrices` its legs are of; default: the only one"
+    ] = field(default=None, kw_only=True)
+    name: Annotated[str | None, Name(), "Text for people, which need not be unique; default: the id"] = field(
+        default=None, kw_only=True
+    )
+    properties: Annotated[
+        dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
+    ] = field(default=None, kw_only=True, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,16 +143,33 @@ class Target:
     level: Annotated[float, Number(low=0.0), "Emergency level; larger is more urgent"]
     loadlist: Annotated[tuple[float, ...], Amounts(), "Amounts still needed, one a material"]
     deadline: Annotated[
-        float | None, Number(unit=TIME), f"Latest arrival, in {TIME.local} from now; default: none"
+        float | None,
+        Number(unit=TIME),
+        f"Latest arrival, in {TIME.local} from now; default: none",
+        ALWAYS_RECORDED,
     ] = None
-    service_time: Annotated[float, Number(low=0.0, unit=TIME), "Time spent unloading at a visit"] = 0.0
+    service_time: Annotated[
+        float, Number(low=0.0, unit=TIME), "Time spent unloading at a visit", ALWAYS_RECORDED
+    ] = 0.0
     requested: Annotated[
         tuple[float, ...] | None,
         Amounts(same_as="loadlist"),
         "Amounts that it asked for at first, one a material, none below its `loadlist`; what a visit earns "
         "is by shares of these, so an area that has nearly all is not as urgent as one that has nothing. "
         "Default: its `loadlist`",
+        ALWAYS_RECORDED,
     ] = None
+    earliest: Annotated[
+        float, Number(low=0.0, unit=TIME), "A visit begins no sooner: a UAV that arrives before waits there"
+    ] = 0.0
+    skills: Annotated[tuple[str, ...], Words(), "A UAV must have all of these to be sent here"] = ()
+    location: Annotated[int | None, Whole(0), "Where it is, as a row of the `matrices`; needed with them"] = (
+        None
+    )
+    name: Annotated[str | None, Name(), "Text for people, which need not be unique; default: the id"] = None
+    properties: Annotated[
+        dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
+    ] = field(default=None, hash=False)
 
     @property
     def need(self) -> tuple[float, ...]:
@@ -136,15 +208,92 @@ class Objective:
         float | None,
         Number(low=0.0),
         "λ, reward lost per unit of distance; 1 is Eq. (14) to the letter; null: 1 / extent",
+        ALWAYS_RECORDED,
     ] = None
-    return_to_base: Annotated[bool, Flag(), "A visit is allowed only if the UAV can still fly home"] = True
-    charge_return: Annotated[bool, Flag(), "The leg home costs reward too"] = False
+    return_to_base: Annotated[
+        bool, Flag(), "A visit is allowed only if the UAV can still fly home", ALWAYS_RECORDED
+    ] = True
+    charge_return: Annotated[bool, Flag(), "The leg home costs reward too", ALWAYS_RECORDED] = False
     unloading: Annotated[
         Unloading,
         Choice(get_args(Unloading)),
         "greedy: a visit unloads all that is needed and carried, the paper's rule. planned: how much it "
         "unloads is decided with the plan, so that a UAV can keep material for a more urgent area",
+        ALWAYS_RECORDED,
     ] = "greedy"
+    half_life: Annotated[
+        float | None,
+        Number(low=MIN_MAGNITUDE, unit=TIME),
+        "Time in which what a delivery earns falls to half; default: it does not fall",
+    ] = None
+    minimum_share: Annotated[
+        float,
+        Number(low=0.0, high=1.0),
+        "Share of what an area needs of a material that earns `minimum_weight` times as much",
+    ] = 0.0
+    minimum_weight: Annotated[
+        float, Number(low=1.0), "How many times as much the first `minimum_share` earns"
+    ] = 1.0
+    makespan_weight: Annotated[
+        float, Number(low=0.0), "Reward lost per unit of time until the last UAV has landed"
+    ] = 0.0
+    change_weight: Annotated[
+        float,
+        Number(low=0.0),
+        "Reward lost for each pair of UAV and area that is visited in `start_plan` and not in the plan",
+    ] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A kind of relief material."""
+
+    name: Annotated[
+        str,
+        Identifier(stem="material", unique=False),
+        "Text for people; default: material-1, material-2, … by place in the list",
+    ]
+    weight: Annotated[float, Number(low=0.0), "Weight of one unit"] = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class NoFlyZone:
+    """A polygon that must not be flown through; its border may be touched.
+
+    A last corner that is the first one again, which closes the polygon in some formats, is dropped.
+    """
+
+    id: Annotated[
+        str,
+        Identifier(stem="zone"),
+        "Unique among the zones; default: zone-1, zone-2, … by place in the list",
+    ]
+    polygon: Annotated[
+        tuple[tuple[float, float], ...],
+        Corners(),
+        "Corners `[x, y]` in either direction, at least 3; no two sides cross. A last corner that is the "
+        "first one again is dropped",
+    ]
+    name: Annotated[str | None, Name(), "Text for people, which need not be unique; default: the id"] = None
+    properties: Annotated[
+        dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
+    ] = field(default=None, hash=False)
+
+    def __post_init__(self) -> None:
+        if len(self.polygon) > 1 and self.polygon[0] == self.polygon[-1]:
+            object.__setattr__(self, "polygon", self.polygon[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Wind:
+    """A wind that is the same everywhere."""
+
+    speed: Annotated[float, Number(low=0.0, unit=SPEED), f"Its speed: {SPEED}"]
+    towards: Annotated[
+        float,
+        Number(low=-360.0, high=360.0),
+        "Where it blows to, in degrees clockwise from north, which is +y",
+    ]
 
 
 @dataclass(frozen=True)
@@ -161,16 +310,37 @@ class Problem:
 
     uavs: Annotated[tuple[UAV, ...], Items(UAV, called="UAVs", least=1), "The swarm"]
     targets: Annotated[tuple[Target, ...], Items(Target, called="targets", least=1), "The rescue areas"]
-    max_steps: Annotated[int, Whole(1, MAX_STEPS), "Most decision steps of a plan, S"] = 5
+    max_steps: Annotated[int, Whole(1, MAX_STEPS), "Most decision steps of a plan, S", ALWAYS_RECORDED] = 5
     crs: Annotated[
         Crs,
         Choice(get_args(Crs)),
         "local: x, y on a plane, Euclidean distances. wgs84: x longitude and y latitude in degrees, great "
         f"circles in {DISTANCE.wgs84}, speeds in {SPEED.wgs84}, times in {TIME.wgs84}",
+        ALWAYS_RECORDED,
     ] = "local"
-    objective: Annotated[Objective, Part(Objective), "What a plan is paid for"] = field(
+    objective: Annotated[Objective, Part(Objective), "What a plan is paid for", ALWAYS_RECORDED] = field(
         default_factory=Objective
     )
+    materials: Annotated[
+        tuple[Material, ...],
+        Items(Material, called="materials"),
+        "The kinds of material, in the order of every `loadlist`; default: material-1, … of weight 1",
+    ] = ()
+    no_fly_zones: Annotated[
+        tuple[NoFlyZone, ...], Items(NoFlyZone, called="no-fly zones"), "What must not be flown through"
+    ] = ()
+    wind: Annotated[Wind | None, Part(Wind), "Wind; default: still air"] = None
+    matrices: Annotated[
+        dict[str, Matrix] | None,
+        Named(Matrix, called="profiles"),
+        "Legs by the names of profiles, in place of distances between positions; then coordinates are for "
+        "display alone",
+    ] = field(default=None, hash=False)
+    start_plan: Annotated[
+        tuple[tuple[int, ...], ...] | None,
+        JointActions(),
+        "An `assignment` to begin from and to compare with; no answer that takes a start earns less",
+    ] = None
 
     def __post_init__(self) -> None:
         context = Context(self.crs, len(self.uavs[0].loadlist) if self.uavs else None)
@@ -203,13 +373,20 @@ class Problem:
         """Number of kinds of material, K."""
         return len(self.uavs[0].loadlist)
 
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """Weight of one unit of each material, K."""
+        return tuple(each.weight for each in self.materials) or (1.0,) * self.n_materials
+
     @cached_property
     def extent(self) -> float:
         """Diagonal of the bounding box of all positions, in distance units; 1 if it is zero.
 
         On the globe the box is over the shortest stretch of longitudes that holds them all, so it may cross
-        the antimeridian, and less than 1e-9 km is zero.
+        the antimeridian, and less than 1e-9 km is zero. With matrices it is the longest leg instead.
         """
+        if self.matrices is not None:
+            return longest_leg(self.matrices.values()) or 1.0
         xs = [x for u in self.uavs for x in (u.x_s, u.x_c)] + [t.x for t in self.targets]
         ys = [y for u in self.uavs for y in (u.y_s, u.y_c)] + [t.y for t in self.targets]
         on_globe = self.crs == "wgs84"

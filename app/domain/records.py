@@ -1,18 +1,19 @@
 """Problems as plain JSON-ready records and back: how they are stored and sent between processes.
 
-A record is complete: every default has been filled in, so that it means the same in a later version. The
-fields are those that are declared; what their kinds say of records is done here for many items at once.
+A record means the same in a later version: defaults have been filled in, but for those that never change
+(:class:`~app.domain.fields.AlwaysRecorded`). The fields are those that are declared; what their kinds say of
+records is done here for many items at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from operator import attrgetter
 from typing import Any
 
-from app.domain.fields import Conversion, Items, Kind, Part, declared_fields
+from app.domain.fields import Conversion, Items, Kind, Named, Part, declared_fields
 from app.domain.problem import Problem
 
 _PLAIN = (float, int, str, bool)
@@ -36,6 +37,11 @@ def problem_from_record(record: Mapping[str, Any]) -> Problem:
     """
     problem: Problem = _read([record], Problem)[0]
     return problem
+
+
+def item_to_record(item: Any) -> dict[str, Any]:
+    """Turn an item of a problem into a record, without fields that have a default that never changes."""
+    return _recorded([item], type(item))[0]
 
 
 def to_record(value: Any) -> Any:
@@ -66,9 +72,13 @@ def _fields(of: type) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]
     same bytes in every version.
     """
     names = tuple(field.name for field in sorted(fields(of), key=attrgetter("kw_only")))
+    return names, _getter(names)
+
+
+def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     if len(names) == 1:
-        return names, lambda value: (getattr(value, names[0]),)
-    return names, attrgetter(*names)
+        return lambda value: (getattr(value, names[0]),)
+    return attrgetter(*names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,24 +88,32 @@ class _Recording:
     Attributes
     ----------
     names
-        Of its fields.
+        Of the fields that records always have.
     values_of
         Gets the values of all of them at once.
+    others
+        Names of the other fields, what gets the value of each, and its default, at which it is left out.
     to_record, from_record
         What turns the values of some of them into what JSON can hold, and back.
     """
 
     names: tuple[str, ...]
     values_of: Callable[[Any], tuple[Any, ...]]
+    others: tuple[tuple[str, Callable[[Any], Any], Any], ...]
     to_record: tuple[tuple[str, Conversion], ...]
     from_record: tuple[tuple[str, Conversion], ...]
 
 
 @cache
 def _recording(of: type) -> _Recording:
-    converted = [(each.name, _conversions(each.kind)) for each in declared_fields(of)]
+    declared = declared_fields(of)
+    converted = [(each.name, _conversions(each.kind)) for each in declared]
+    others = {each.name: each for each in declared if not each.always_recorded}
+    names = tuple(name for name in _fields(of)[0] if name not in others)
     return _Recording(
-        *_fields(of),
+        names,
+        _getter(names),
+        tuple((name, attrgetter(name), each.default) for name, each in others.items()),
         tuple((name, conversions[0]) for name, conversions in converted if conversions),
         tuple((name, conversions[1]) for name, conversions in converted if conversions),
     )
@@ -105,18 +123,31 @@ def _conversions(kind: Kind) -> tuple[Conversion, Conversion] | None:
     """Return what turns values of a kind into records, and back; None where they are the same."""
     if isinstance(kind, Items):
         return lambda items: _recorded(items, kind.of), lambda records: tuple(_read(records, kind.of))
+    if isinstance(kind, Named):
+        return (
+            lambda parts: dict(zip(parts, _recorded(parts.values(), kind.of), strict=True)),
+            lambda records: dict(zip(records, _read(records.values(), kind.of), strict=True)),
+        )
     if isinstance(kind, Part):
         return lambda part: _recorded([part], kind.of)[0], lambda record: _read([record], kind.of)[0]
     return kind.conversions
 
 
-def _recorded(items: Iterable[Any], of: type) -> list[dict[str, Any]]:
+def _recorded(items: Collection[Any], of: type) -> list[dict[str, Any]]:
     recording = _recording(of)
     names, values_of = recording.names, recording.values_of
     records = [dict(zip(names, values_of(item))) for item in items]  # noqa: B905 - as long as each other, and quicker
+    for name, value_of, default in recording.others:
+        values = list(map(value_of, items))
+        # Nearly always, and counted quicker than looked at one by one.
+        if values.count(default) == len(values):
+            continue
+        for record, value in zip(records, values, strict=True):
+            if value != default:
+                record[name] = value
     for name, convert in recording.to_record:
         for record in records:
-            value = record[name]
+            value = record.get(name)
             if value is not None:
                 record[name] = convert(value)
     return records

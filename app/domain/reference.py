@@ -55,7 +55,8 @@ def _limits(field: DeclaredField) -> str:
     if isinstance(kind, Number | Whole):
         if kind.low == -MAX_MAGNITUDE:
             return ""
-        return f"from {kind.low:g}" if kind.high == MAX_MAGNITUDE else f"{kind.low:g} to {kind.high:g}"
+        below = "below " if isinstance(kind, Number) and kind.below else ""
+        return f"from {kind.low:g}" if kind.high == MAX_MAGNITUDE else f"{kind.low:g} to {below}{kind.high:g}"
     if isinstance(kind, Amounts):
         return "each from 0"
     if isinstance(kind, Items):
@@ -71,7 +72,7 @@ def _default(field: DeclaredField) -> str:
         return f"its `{same_as}`"
     if field.default is MISSING:
         return "required"
-    if isinstance(kind, Part):
+    if isinstance(kind, Part) and not field.optional and not isinstance(kind, Items):
         return "its defaults"
     return f"`{_written(kind.to_record(field.default))}`"
 

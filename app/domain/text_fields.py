@@ -14,7 +14,16 @@ from app.domain.identifiers import fault_of
 
 @dataclass(frozen=True)
 class Words(Kind):
-    """A list of words, or of ids: whether there are items of these ids is a rule between fields."""
+    """A list of words, or of ids.
+
+    Attributes
+    ----------
+    ids_of
+        Name of the problem's list whose items have these ids; that they are there is a rule between fields.
+        None where they are words.
+    """
+
+    ids_of: str | None = None
 
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
         """Yield the words that could not be an identifier."""

@@ -10,6 +10,7 @@ from typing import Any
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
 from app.domain.fields import declared_fields
 from app.domain.problem import UAV, Target
+from app.domain.records import item_to_record
 
 Point = tuple[float, float]
 
@@ -77,10 +78,13 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
 def _fields(item: UAV | Target, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the fields of an item by their names, but for those in whose place something else is said."""
     of: type = type(item)
+    record = item_to_record(item)
     properties: dict[str, Any] = {}
     for each in declared_fields(of):
-        plain = {each.name: each.kind.to_record(getattr(item, each.name))}
-        properties.update(instead.get(each.name, plain))
+        if each.name in instead:
+            properties.update(instead[each.name])
+        elif each.name in record:
+            properties[each.name] = record[each.name]
     return properties
 
 
