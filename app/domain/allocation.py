@@ -91,7 +91,7 @@ _MEANINGS = {
     UnmetCode.OUT_OF_RANGE: "No UAV that carries any of it has the range to fly there, not even directly.",
     UnmetCode.DEADLINE: "No UAV with any of it and the range is there in time, not even directly.",
     UnmetCode.ENDURANCE: "A UAV that could bring some of it would be in the air for too long.",
-    UnmetCode.TOO_EARLY_TO_WAIT: "A UAV that could bring some of it cannot stay in the air until the area opens.",
+    UnmetCode.TOO_EARLY_TO_WAIT: "A UAV that could bring some of it cannot wait in the air until it opens.",
     UnmetCode.AVAILABLE_UNTIL: "A UAV that could bring some of it would land too late.",
     UnmetCode.COMMITTED: "The UAVs that could bring some of it are committed to other visits first.",
     UnmetCode.STEP_LIMIT: "A UAV has some of it left over and lacks only a decision step for one more visit.",

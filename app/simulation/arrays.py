@@ -10,11 +10,11 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.recfunctions import structured_to_unstructured
 
 from app.domain.problem import ROUNDING, Problem
 from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
@@ -22,6 +22,7 @@ from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
+Records = npt.NDArray[np.void]
 
 NONE = -1
 """In place of a target in a list: there is none."""
@@ -40,61 +41,107 @@ class Axes:
     """
 
     names: str = ""
-    padding: float = 0.0
+    padding: Any = 0.0
 
 
-class Term(IntEnum):
-    """Columns of ``ProblemArrays.terms``, what holds for a whole problem.
+TERMS = np.dtype(
+    [
+        ("weight", "f8"),
+        ("decay", "f8"),
+        ("bonus", "f8"),
+        ("makespan", "f8"),
+        ("change", "f8"),
+        ("crumb", "f8"),
+        ("return_to_base", "?"),
+        ("charge_return", "?"),
+        ("timed", "?"),
+        ("in_wind", "?"),
+        ("metric", "?"),
+    ],
+    align=True,
+)
+"""What holds for a whole problem.
 
-    Attributes
-    ----------
-    TIMED
-        1 where times of legs are given, 0 where they are lengths over speeds.
-    IN_WIND
-        1 where the air length of a leg is time · speed, 0 where it is the length over ground.
-    DECAY
-        1 / half_life, 0 where nothing decays.
-    BONUS
-        What the first share of a need earns above the rest, minimum_weight - 1; 0 where there is none.
-    MAKESPAN, CHANGE
-        Weights of the makespan and of changes.
-    METRIC
-        1 where no way over a third place is shorter, or takes less time, than the leg itself.
-    """
+weight, makespan, change
+    Distance weight λ as it is used, and the weights of makespan and changes.
+decay
+    1 / half_life, 0 where nothing decays.
+bonus
+    What the first share of a need earns above the rest, minimum_weight - 1; 0 where there is none.
+crumb
+    Amount below which what is left of another one may be rounding: that share of the largest.
+return_to_base, charge_return
+    The objective's switches.
+timed
+    Whether times of legs are given; otherwise they are lengths over speeds.
+in_wind
+    Whether the air length of a leg is time · speed, not the length over ground.
+metric
+    Whether no way over a third place is shorter, or takes less time, than the leg itself.
+"""
 
-    TIMED = 0
-    IN_WIND = 1
-    DECAY = 2
-    BONUS = 3
-    MAKESPAN = 4
-    CHANGE = 5
-    METRIC = 6
+UAVS = np.dtype(
+    [
+        ("speed", "f8"),
+        ("voyage", "f8"),
+        ("dis", "f8"),
+        ("ready", "f8"),
+        ("until", "f8"),
+        ("airborne", "f8"),
+        ("endurance", "f8"),
+        ("start_home", "f8"),
+        ("start_home_time", "f8"),
+        ("leg_class", "i8"),
+        ("watched", "?"),
+        ("on_ground", "?"),
+    ],
+    align=True,
+)
+"""What a UAV has.
 
+speed, dis
+    As in the request.
+voyage, endurance
+    Range, and time that it may be in the air, without what has to be left after landing; the latter is
+    infinite where there is no limit.
+ready, until
+    Its clock at the start, and the latest time to have landed; infinite where there is none.
+airborne
+    Time in the air at the start.
+start_home, start_home_time
+    Length of the leg from its current position to its starting point, 0 where there is none, and its time
+    where times are given.
+leg_class
+    Class of its legs.
+watched
+    Whether ``until`` or ``endurance`` is a limit.
+on_ground
+    Whether it waits for its first visit on the ground.
+"""
 
-class Limit(IntEnum):
-    """Columns of ``ProblemArrays.limits``, what a UAV has besides its range.
+AREAS = np.dtype(
+    [
+        ("level", "f8"),
+        ("unit", "f8"),
+        ("need_total", "f8"),
+        ("earliest", "f8"),
+        ("deadline", "f8"),
+        ("service", "f8"),
+    ],
+    align=True,
+)
+"""What holds for a target.
 
-    Attributes
-    ----------
-    READY, UNTIL
-        Its clock at the start, and the latest time to have landed; infinite where there is none.
-    AIRBORNE, ENDURANCE
-        Time in the air at the start, and how much may be; infinite where there is no limit.
-    WATCHED
-        1 where ``UNTIL`` or ``ENDURANCE`` is a limit.
-    ON_GROUND
-        1 where it waits for its first visit on the ground.
-    START_HOME_TIME
-        Time of the leg from its place to its starting point, where times are given.
-    """
-
-    READY = 0
-    UNTIL = 1
-    AIRBORNE = 2
-    ENDURANCE = 3
-    WATCHED = 4
-    ON_GROUND = 5
-    START_HOME_TIME = 6
+level
+    What meeting the whole need at once earns: the emergency level, times the share of what was requested
+    that is still needed, and what the first share earns above.
+unit
+    What a unit of material beyond the first share earns.
+need_total
+    Sum of the needs over materials; 0 for a target that needs nothing.
+earliest, deadline, service
+    As in the request; the deadline is infinite where there is none.
+"""
 
 
 class ProblemArrays(NamedTuple):
@@ -111,53 +158,30 @@ class ProblemArrays(NamedTuple):
         (P, C, N, N) length of the leg from a target to another.
     home
         (P, M, N) length of the leg from a target to a UAV's starting point; 0 where there is none.
-    start_home
-        (P, M) length of the leg from a UAV's current position in the request to its starting point, likewise.
     start_time, between_time, home_time
         (P, M, N), (P, C, N, N), (P, M, N) times of these legs, where they are given.
-    leg_class
-        (P, M) class of each UAV's legs.
-    speed, dis
-        (P, M) as in the request.
-    voyage
-        (P, M) range, without what has to be left after landing.
     kept_range
         (P, M, N) air length that has to be left on arrival at a target: that of the way home, where it is
         required; ``UNREACHABLE`` where the UAV must not be sent there.
-    limits
-        (P, M, ``Limit``)
-    committed
-        (P, M, V) targets that a UAV visits first, in this order; ``NONE`` after the last.
+    uavs
+        (P, M) of :data:`UAVS`.
+    committed, before
+        (P, M, V) targets that a UAV visits first, in this order, and (P, M, W) those that it visits in
+        ``start_plan``, each once, where changes cost reward; ``NONE`` after the last.
     ret
         (P, M) UAVs that are returning.
     load
         (P, M, K) amounts carried.
+    areas
+        (P, N) of :data:`AREAS`.
     need
         (P, N, K) amounts needed.
     requested
         (P, N, K) amounts that the needs are a part of; the needs, where the request says nothing else.
     beyond
         (P, N, K) amounts of the needs beyond the first share: a need above it is partly of the first share.
-    crumb
-        (P,) amount below which what is left of another one may be rounding: that share of the largest.
-    need_total
-        (P, N) sum of the needs over materials; 0 for a target that needs nothing.
-    level
-        (P, N) what meeting the whole need at once earns: the emergency level, times the share of what was
-        requested that is still needed, and what the first share earns above.
-    unit
-        (P, N) what a unit of material beyond the first share earns.
-    earliest, deadline, service
-        (P, N); deadline is infinite where there is none.
-    weight
-        (P,) distance weight λ as it is used.
     terms
-        (P, ``Term``)
-    before
-        (P, M, W) targets that a UAV visits in ``start_plan``, each once, where changes cost reward; ``NONE``
-        after the last.
-    return_to_base, charge_return
-        (P,) the objective's switches.
+        (P,) of :data:`TERMS`.
     max_steps
         (P,) S.
     """
@@ -165,34 +189,20 @@ class ProblemArrays(NamedTuple):
     start_target: Annotated[Floats, Axes("MN")]
     between: Annotated[Floats, Axes("CNN")]
     home: Annotated[Floats, Axes("MN")]
-    start_home: Annotated[Floats, Axes("M")]
     start_time: Annotated[Floats, Axes("MN")]
     between_time: Annotated[Floats, Axes("CNN")]
     home_time: Annotated[Floats, Axes("MN")]
-    leg_class: Annotated[Integers, Axes("M")]
-    speed: Annotated[Floats, Axes("M", padding=1.0)]
-    voyage: Annotated[Floats, Axes("M")]
-    dis: Annotated[Floats, Axes("M")]
     kept_range: Annotated[Floats, Axes("MN")]
-    limits: Annotated[Floats, Axes("MX")]
+    uavs: Annotated[Records, Axes("M", padding=(1.0, *(0.0,) * 8, 0, False, False))]
     committed: Annotated[Integers, Axes("MX", padding=-1)]
+    before: Annotated[Integers, Axes("MX", padding=-1)]
     ret: Annotated[Flags, Axes("M", padding=True)]
     load: Annotated[Floats, Axes("MX")]
+    areas: Annotated[Records, Axes("N", padding=(0.0, 0.0, 0.0, 0.0, np.inf, 0.0))]
     need: Annotated[Floats, Axes("NX")]
     requested: Annotated[Floats, Axes("NX")]
     beyond: Annotated[Floats, Axes("NX")]
-    crumb: Annotated[Floats, Axes()]
-    need_total: Annotated[Floats, Axes("N")]
-    level: Annotated[Floats, Axes("N")]
-    unit: Annotated[Floats, Axes("N")]
-    earliest: Annotated[Floats, Axes("N")]
-    deadline: Annotated[Floats, Axes("N", padding=np.inf)]
-    service: Annotated[Floats, Axes("N")]
-    weight: Annotated[Floats, Axes()]
-    terms: Annotated[Floats, Axes("X")]
-    before: Annotated[Integers, Axes("MX", padding=-1)]
-    return_to_base: Annotated[Flags, Axes()]
-    charge_return: Annotated[Flags, Axes()]
+    terms: Annotated[Records, Axes()]
     max_steps: Annotated[Integers, Axes()]
 
     @property
@@ -234,80 +244,72 @@ def _compile(problem: Problem) -> ProblemArrays:
     requested = np.array(
         [t.loadlist if t.requested is None else t.requested for t in targets], dtype=np.float64
     )
-    need_total = need.sum(axis=1)
     share = objective.minimum_share if objective.minimum_weight > 1.0 else 0.0
     bonus = objective.minimum_weight - 1.0 if share > 0.0 else 0.0
     beyond = (1.0 - share) * requested
-    level = np.array([t.urgency for t in targets], dtype=np.float64)
-    unit = np.where(need_total > 0.0, level / np.where(need_total > 0.0, need_total, 1.0), 0.0)
-    if bonus > 0.0:
-        level = level + bonus * unit * np.maximum(0.0, need - beyond).sum(axis=1)
-    index = {target.id: j for j, target in enumerate(targets)}
     legs = leg_arrays(problem)
+    index = {target.id: j for j, target in enumerate(targets)}
+    terms = np.zeros(1, TERMS)
+    terms["weight"], terms["makespan"] = problem.distance_weight, objective.makespan_weight
+    terms["change"], terms["bonus"] = objective.change_weight, bonus
+    terms["decay"] = 0.0 if objective.half_life is None else 1.0 / objective.half_life
+    terms["crumb"] = ROUNDING * max(load.max(), requested.max())
+    terms["return_to_base"], terms["charge_return"] = objective.return_to_base, objective.charge_return
+    terms["timed"], terms["in_wind"], terms["metric"] = legs.timed, legs.in_wind, legs.metric
     return ProblemArrays(
         start_target=legs.start_target[None],
         between=legs.between[None],
         home=legs.home[None],
-        start_home=legs.start_home[None],
         start_time=legs.start_time[None],
         between_time=legs.between_time[None],
         home_time=legs.home_time[None],
-        leg_class=legs.leg_class[None],
-        speed=np.array([[u.speed for u in uavs]], dtype=np.float64),
-        voyage=np.array([[u.voyage * (1.0 - u.reserve) for u in uavs]], dtype=np.float64),
-        dis=np.array([[u.dis for u in uavs]], dtype=np.float64),
         kept_range=_kept_range(problem, legs, index)[None],
-        limits=_limits(problem, legs)[None],
+        uavs=_uavs(problem, legs)[None],
         committed=_listed([[index[each] for each in u.committed] for u in uavs])[None],
+        before=_listed(_visited_before(problem))[None],
         ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
         load=load[None],
+        areas=_areas(problem, need, beyond, bonus)[None],
         need=need[None],
         requested=requested[None],
         beyond=beyond[None],
-        crumb=np.array([ROUNDING * max(load.max(), requested.max())]),
-        need_total=need_total[None],
-        level=level[None],
-        unit=unit[None],
-        earliest=np.array([[t.earliest for t in targets]], dtype=np.float64),
-        deadline=np.array(
-            [[np.inf if t.deadline is None else t.deadline for t in targets]], dtype=np.float64
-        ),
-        service=np.array([[t.service_time for t in targets]], dtype=np.float64),
-        weight=np.array([problem.distance_weight], dtype=np.float64),
-        terms=np.array(
-            [
-                [
-                    float(legs.timed),
-                    float(legs.in_wind),
-                    0.0 if objective.half_life is None else 1.0 / objective.half_life,
-                    bonus,
-                    objective.makespan_weight,
-                    objective.change_weight,
-                    float(legs.metric),
-                ]
-            ]
-        ),
-        before=_listed(_visited_before(problem))[None],
-        return_to_base=np.array([objective.return_to_base], dtype=np.bool_),
-        charge_return=np.array([objective.charge_return], dtype=np.bool_),
+        terms=terms,
         max_steps=np.array([problem.max_steps], dtype=np.int64),
     )
 
 
-def _limits(problem: Problem, legs: LegArrays) -> Floats:
-    """Return the columns of :class:`Limit` for every UAV."""
-    limits = np.zeros((problem.n_uavs, len(Limit)))
-    for i, uav in enumerate(problem.uavs):
-        own = limits[i]
-        own[Limit.READY] = uav.available_from
-        own[Limit.UNTIL] = np.inf if uav.available_until is None else uav.available_until
-        own[Limit.AIRBORNE] = uav.airborne
-        own[Limit.ENDURANCE] = np.inf if uav.endurance is None else uav.endurance * (1.0 - uav.reserve)
-        own[Limit.WATCHED] = uav.available_until is not None or uav.endurance is not None
-        at_start = (uav.x_c, uav.y_c) == (uav.x_s, uav.y_s) and uav.home_location in (None, uav.location)
-        own[Limit.ON_GROUND] = at_start and uav.dis == 0.0 and uav.airborne == 0.0
-        own[Limit.START_HOME_TIME] = legs.start_home_time[i]
-    return limits
+def _uavs(problem: Problem, legs: LegArrays) -> Records:
+    columns = np.zeros(problem.n_uavs, UAVS)
+    uavs = problem.uavs
+    columns["speed"], columns["dis"] = [u.speed for u in uavs], [u.dis for u in uavs]
+    columns["voyage"] = [u.voyage * (1.0 - u.reserve) for u in uavs]
+    columns["ready"], columns["airborne"] = [u.available_from for u in uavs], [u.airborne for u in uavs]
+    columns["until"] = [np.inf if u.available_until is None else u.available_until for u in uavs]
+    columns["endurance"] = [np.inf if u.endurance is None else u.endurance * (1.0 - u.reserve) for u in uavs]
+    columns["watched"] = np.isfinite(columns["until"]) | np.isfinite(columns["endurance"])
+    columns["on_ground"] = [
+        (u.x_c, u.y_c) == (u.x_s, u.y_s)
+        and u.home_location in (None, u.location)
+        and u.dis == 0.0
+        and u.airborne == 0.0
+        for u in uavs
+    ]
+    columns["start_home"], columns["start_home_time"] = legs.start_home, legs.start_home_time
+    columns["leg_class"] = legs.leg_class
+    return columns
+
+
+def _areas(problem: Problem, need: Floats, beyond: Floats, bonus: float) -> Records:
+    columns, total = np.zeros(problem.n_targets, AREAS), need.sum(axis=1)
+    level = np.array([t.urgency for t in problem.targets], dtype=np.float64)
+    unit = np.where(total > 0.0, level / np.where(total > 0.0, total, 1.0), 0.0)
+    if bonus > 0.0:
+        level = level + bonus * unit * np.maximum(0.0, need - beyond).sum(axis=1)
+    columns["level"], columns["unit"], columns["need_total"] = level, unit, total
+    columns["earliest"] = [t.earliest for t in problem.targets]
+    columns["deadline"] = [np.inf if t.deadline is None else t.deadline for t in problem.targets]
+    columns["service"] = [t.service_time for t in problem.targets]
+    return columns
 
 
 def _kept_range(problem: Problem, legs: LegArrays, index: dict[str, int]) -> Floats:
@@ -335,7 +337,7 @@ def _visited_before(problem: Problem) -> list[list[int]]:
 
 
 def _listed(lists: list[list[int]]) -> Integers:
-    """Return lists as rows that end in ``NONE``, at least one where any list has an entry; (R, 0) if none has."""
+    """Return lists as rows that end in ``NONE``; (R, 0) where all are empty."""
     longest = max(map(len, lists))
     return np.array([row + [NONE] * (longest + 1 - len(row)) for row in lists], np.int64)[
         :, : longest + 1 if longest else 0
@@ -365,7 +367,7 @@ def part(arrays: ProblemArrays, uavs: Integers, targets: Integers) -> ProblemArr
         (P, M) and (P, N): those that each part has, in their order there.
     """
     # A part has as many classes of legs as there may be among its UAVs, numbered anew.
-    classes, number = _classes_of(arrays.leg_class[0][uavs])
+    classes, number = _classes_of(arrays.uavs["leg_class"][0][uavs])
     taken = {"M": uavs, "N": targets, "C": classes}
     columns = {}
     for name, axes in AXES.items():
@@ -376,11 +378,13 @@ def part(arrays: ProblemArrays, uavs: Integers, targets: Integers) -> ProblemArr
             columns[name] = np.empty((len(uavs), *shape, *column.shape[1 + len(some) :]), column.dtype)
             continue
         for axis in range(len(some)):
-            some[axis] = some[axis].reshape(len(uavs), *(-1 if each == axis else 1 for each in range(len(some))))
+            some[axis] = some[axis].reshape(
+                len(uavs), *(-1 if each == axis else 1 for each in range(len(some)))
+            )
         column = column[0][tuple(some)] if some else np.repeat(column[:1], len(uavs), axis=0)
         # Compiled code is made anew for every order of memory, and nobody should wait for that.
         columns[name] = np.ascontiguousarray(column)
-    columns["leg_class"] = number
+    columns["uavs"]["leg_class"] = number
     columns["committed"], columns["before"] = (
         _numbered_anew(columns[name], targets, arrays.shape[1]) for name in ("committed", "before")
     )
@@ -398,19 +402,20 @@ def _classes_of(given: Integers) -> tuple[Integers, Integers]:
 
 
 def _numbered_anew(listed: Integers, targets: Integers, n: int) -> Integers:
-    """Return lists of targets (P, M, X) by their places in each part; one that it lacks is none that it has."""
+    """Return lists of targets (P, M, X) by their places in each part; N of a part stands for others."""
     places = np.full((len(targets), n + 1), targets.shape[1], np.int64)
     np.put_along_axis(places, targets, np.arange(targets.shape[1])[None, :], axis=1)
     places[:, n] = NONE
-    return np.take_along_axis(places, np.where(listed == NONE, n, listed).reshape(len(places), -1), axis=1).reshape(
-        listed.shape
-    )
+    return np.take_along_axis(
+        places, np.where(listed == NONE, n, listed).reshape(len(places), -1), axis=1
+    ).reshape(listed.shape)
 
 
 def alike(arrays: ProblemArrays) -> Integers:
     """Return for each UAV of a stack's first problem the first one that is like it in everything, (M,)."""
-    of = len(arrays.speed[0])
-    told = np.column_stack([getattr(arrays, name)[0].reshape(of, -1) for name in OF_UAVS])
+    columns = [getattr(arrays, name)[0] for name in OF_UAVS]
+    plain = [structured_to_unstructured(each) if each.dtype.names else each for each in columns]
+    told = np.column_stack([each.reshape(len(each), -1) for each in plain])
     first: dict[bytes, int] = {}
     # Adding 0 makes one zero of the two.
     return np.array([first.setdefault(row.tobytes(), i) for i, row in enumerate(told + 0.0)], np.int64)
@@ -430,10 +435,11 @@ def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
     return ProblemArrays(**{name: _pad(arrays, AXES[name].padding) for name, arrays in columns})
 
 
-def _pad(arrays: Sequence[npt.NDArray[Any]], value: float) -> npt.NDArray[Any]:
+def _pad(arrays: Sequence[npt.NDArray[Any]], value: Any) -> npt.NDArray[Any]:
     largest = [max(sizes) for sizes in zip(*(a.shape[1:] for a in arrays), strict=True)]
     total = sum(len(a) for a in arrays)
-    padded = np.full((total, *largest), value, dtype=arrays[0].dtype)
+    padded = np.empty((total, *largest), dtype=arrays[0].dtype)
+    padded[...] = np.array(value, dtype=arrays[0].dtype)
     row = 0
     for a in arrays:
         padded[(slice(row, row + len(a)), *(slice(size) for size in a.shape[1:]))] = a

@@ -89,7 +89,7 @@ def _trace(
     for s in range(actions.shape[0]):
         for i in range(actions.shape[1]):
             j = actions[s, i]
-            if j == arrays.level.shape[1]:
+            if j == arrays.need.shape[1]:
                 continue
             legs[s, i] = simulator.leg_to(arrays, episodes, 0, i, j)
             time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, legs[s, i])

@@ -104,7 +104,7 @@ def _fly(
             if planned:
                 before = episodes.satisfaction[0]
                 simulator.deliver(arrays, episodes, i, j, delivered, s)
-                plan.value[i, s] = episodes.satisfaction[0] - before - arrays.weight[0] * plan.leg[i, s]
+                plan.value[i, s] = episodes.satisfaction[0] - before - arrays.terms[0].weight * plan.leg[i, s]
             else:
                 plan.value[i, s] = simulator.act(arrays, episodes, 0, i, j)
     for i in range(m):

@@ -166,7 +166,7 @@ def gain_of_visit(
             q = _place_in_plan(trial, h, cursor)
             if q != NONE:
                 charge(total, -plan.value[h, q])
-        if arrays.charge_return[0]:
+        if arrays.terms[0].charge_return:
             back = simulator.leg_home(arrays, episodes, 0, h)
             exchange(total, -visit.cost_of(arrays, 0, plan.back[h]), -visit.cost_of(arrays, 0, back))
     if visit.has_closing_cost(arrays, 0):
@@ -194,16 +194,14 @@ def gain_of_undisturbed_visit(
     if place < plan.visits.length[i]:
         leg = visit.leg(arrays, 0, i, j, plan.visits.target[i, place])
         exchange(total, -visit.cost_of(arrays, 0, plan.leg[i, place]), -visit.cost_of(arrays, 0, leg))
-    elif arrays.charge_return[0]:
+    elif arrays.terms[0].charge_return:
         back = simulator.leg_home(arrays, trial.episodes, 0, i)
         exchange(total, -visit.cost_of(arrays, 0, plan.back[i]), -visit.cost_of(arrays, 0, back))
     return gain(total)
 
 
 @inlined
-def is_undisturbed(
-    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int
-) -> bool:
+def is_undisturbed(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
     """Whether a visit after which all others are legal changes nothing but the way of its UAV.
 
     The UAV and the target are as they are in the plan at that place, and the plan does not visit it any

@@ -1,4 +1,4 @@
-"""Legs of a problem as arrays (section 8 of the rules): lengths, and times where they do not follow from these.
+"""Legs of a problem as arrays (section 8 of the rules): lengths, and times that do not follow from them.
 
 UAVs that fly the same legs in the same time are of one class of legs: all of them on open ground or round
 zones, those of one speed in wind, those of one profile (and, with durations, of no other difference) where
@@ -25,7 +25,7 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 UNREACHABLE = 1e30
-"""Length and time of a leg that does not exist: beyond every limit, and finite, so that nothing becomes NaN."""
+"""Length and time of a leg that does not exist: beyond every limit, and finite, so nothing becomes NaN."""
 
 MOST_LEGS = 100_000_000
 """Legs between targets, over all classes; their lengths and times take 16 bytes each."""
@@ -71,7 +71,7 @@ class LegArrays(NamedTuple):
 class _LegClass(NamedTuple):
     """UAVs that fly the same legs in the same time; `speed` is None where times follow from their own."""
 
-    legs: Legs
+    legs: Legs | MatrixLegs
     speed: float | None
     members: Integers
 
@@ -84,7 +84,9 @@ def leg_arrays(problem: Problem) -> LegArrays:
     ProblemTooLarge
         If there are more legs than :data:`MOST_LEGS`.
     """
-    wind = problem.wind if problem.wind is not None and problem.wind.speed > 0.0 else None
+    wind = None
+    if problem.wind is not None and problem.wind.speed > 0.0:
+        wind = Wind(problem.wind.speed, problem.wind.towards)
     if problem.matrices is not None:
         classes = _of_matrices(problem)
     elif problem.no_fly_zones or wind is not None:
@@ -130,7 +132,9 @@ def _of_matrices(problem: Problem) -> list[_LegClass]:
         by_speed = timed and matrices[profile].duration is None
         members.setdefault((profile, uav.speed if by_speed else 1.0 if timed else None), []).append(i)
     return [
-        _LegClass(MatrixLegs(rows, matrices[profile].distance, matrices[profile].duration), speed, np.array(of))
+        _LegClass(
+            MatrixLegs(rows, matrices[profile].distance, matrices[profile].duration), speed, np.array(of)
+        )
         for (profile, speed), of in members.items()
     ]
 

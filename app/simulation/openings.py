@@ -165,7 +165,7 @@ class Lookout:
     ) -> None:
         # Copies of what is eased for a while.
         self._arrays = arrays._replace(
-            voyage=arrays.voyage.copy(), deadline=arrays.deadline.copy(), max_steps=arrays.max_steps.copy()
+            uavs=arrays.uavs.copy(), areas=arrays.areas.copy(), max_steps=arrays.max_steps.copy()
         )
         self._plan, self._trial, self._planned, self._hurry = plan, trial, planned, hurry
         # A visit with many materials takes longer.
@@ -184,7 +184,7 @@ class Lookout:
             return None
         comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
         if comers == _IN_RANGE and not visit.is_late(
-            float(start.arrival[j]), float(self._arrays.deadline[0, j])
+            float(start.arrival[j]), float(self._arrays.areas["deadline"][0, j])
         ):
             comers = _IN_TIME if start.able[j] < 0 else _ABLE
         found = Places(
@@ -216,7 +216,7 @@ class Lookout:
         if lacks & TIME:
             route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
             for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
-                deadline = float(self._arrays.deadline[0, x])
+                deadline = float(self._arrays.areas["deadline"][0, x])
                 if visit.is_late(deadline + after, deadline):
                     late[x] = max(after, late.get(x, 0.0))
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
@@ -238,10 +238,12 @@ def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
     time = visit.leg_time(arrays, 0, i, visit.START, j, length)
     if visit.is_barred(arrays, 0, i, visit.START, j):
         return visit.BARRED
-    if visit.is_out_of_range(arrays, 0, i, j, arrays.dis[0, i] + visit.air_length(arrays, 0, i, length, time)):
+    if visit.is_out_of_range(
+        arrays, 0, i, j, arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
+    ):
         return visit.OUT_OF_RANGE
     clock = visit.ready(arrays, 0, i)
-    if visit.is_late(clock + time, arrays.deadline[0, j]):
+    if visit.is_late(clock + time, arrays.areas[0, j].deadline):
         return visit.TOO_LATE
     if visit.is_watched(arrays, 0, i):
         end = visit.departure_after(arrays, 0, j, clock + time)
@@ -258,19 +260,19 @@ def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
 @simulator.compiled
 def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, start: Start) -> None:
     """Which UAV carries what a target needs, which of these has the range, and which of those is first."""
-    for i in range(arrays.speed.shape[1]):
+    for i in range(arrays.load.shape[1]):
         for q in range(targets.shape[0]):
             j = targets[q]
             if not _carries(arrays, plan, i, j):
                 continue
             length = visit.leg(arrays, 0, i, visit.START, j)
             time = visit.leg_time(arrays, 0, i, visit.START, j, length)
-            flown = arrays.dis[0, i] + visit.air_length(arrays, 0, i, length, time)
-            missing = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.voyage[0, i]
+            flown = arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
+            missing = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.uavs[0, i].voyage
             if missing < start.missing[j]:
                 start.missing[j], start.carrier[j] = missing, i
             rule = direct_rule(arrays, i, j)
-            if rule != visit.BARRED and rule != visit.OUT_OF_RANGE:
+            if rule not in (visit.BARRED, visit.OUT_OF_RANGE):
                 arrival = visit.ready(arrays, 0, i) + time
                 if arrival < start.arrival[j]:
                     start.arrival[j], start.fastest[j] = arrival, i
@@ -284,11 +286,9 @@ def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) 
     comes = _carries(arrays, plan, i, j)
     if comes and comers > _COMERS:
         rule = direct_rule(arrays, i, j)
-        comes = rule == visit.ALLOWED or (
-            rule != visit.BARRED
-            and rule != visit.OUT_OF_RANGE
-            and (comers == _IN_RANGE or (comers == _IN_TIME and rule != visit.TOO_LATE))
-        )
+        in_range = rule not in (visit.BARRED, visit.OUT_OF_RANGE)
+        enough = comers == _IN_RANGE or (comers == _IN_TIME and rule != visit.TOO_LATE)
+        comes = rule == visit.ALLOWED or (in_range and enough)
     return comes
 
 
@@ -365,11 +365,11 @@ def _look(
 def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
     """Give a UAV range and its visits time and a step without limit; what they had is kept."""
     length = plan.visits.length[i]
-    kept[0], kept[1] = arrays.voyage[0, i], arrays.deadline[0, j]
-    arrays.voyage[0, i], arrays.deadline[0, j] = _EASED, np.inf
+    kept[0], kept[1] = arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline
+    arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = _EASED, np.inf
     for s in range(length):
         x = plan.visits.target[i, s]
-        kept[2 + s], arrays.deadline[0, x] = arrays.deadline[0, x], np.inf
+        kept[2 + s], arrays.areas[0, x].deadline = arrays.areas[0, x].deadline, np.inf
     arrays.max_steps[0] += 1
 
 
@@ -379,8 +379,8 @@ def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: 
     length = plan.visits.length[i]
     arrays.max_steps[0] -= 1
     for s in range(length):
-        arrays.deadline[0, plan.visits.target[i, length - 1 - s]] = kept[1 + length - s]
-    arrays.voyage[0, i], arrays.deadline[0, j] = kept[0], kept[1]
+        arrays.areas[0, plan.visits.target[i, length - 1 - s]].deadline = kept[1 + length - s]
+    arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = kept[0], kept[1]
 
 
 @inlined

@@ -26,7 +26,7 @@ def detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -
     extra = _leg(arrays, plan, i, place, j)
     if place < plan.visits.length[i]:
         extra += visit.leg(arrays, 0, i, j, plan.visits.target[i, place]) - plan.leg[i, place]
-    elif arrays.charge_return[0]:
+    elif arrays.terms[0].charge_return:
         extra += visit.way_home(arrays, 0, i, j) - plan.back[i]
     return extra
 
@@ -50,7 +50,7 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
     int
         The sum of what is lacking, beyond the tolerance.
     """
-    length, voyage = plan.visits.length[i], arrays.voyage[0, i]
+    length, voyage = plan.visits.length[i], arrays.uavs[0, i].voyage
     lack = 0
     lacks[0] = 0.0
     if length >= arrays.max_steps[0]:
@@ -65,8 +65,8 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
         flown += visit.air_length(arrays, 0, i, leg, time)
         lacks[1] = max(lacks[1], visit.flown_with_return(arrays, 0, i, x, flown) - voyage)
         arrival = clock + time
-        lacks[3 + s - place] = arrival - arrays.deadline[0, x]
-        late = late or visit.is_late(arrival, arrays.deadline[0, x])
+        lacks[3 + s - place] = arrival - arrays.areas[0, x].deadline
+        late = late or visit.is_late(arrival, arrays.areas[0, x].deadline)
         clock, at = visit.departure_after(arrays, 0, x, arrival), x
     if voyage + lacks[1] > visit.farthest(voyage):
         lack += RANGE

@@ -187,7 +187,7 @@ def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
     materials = episodes.load.shape[2]
     for i in range(episodes.at.shape[1]):
         episodes.at[b, i] = START
-        episodes.flown[b, i] = arrays.dis[p, i]
+        episodes.flown[b, i] = arrays.uavs[p, i].dis
         episodes.clock[b, i] = ready(arrays, p, i)
         episodes.aloft[b, i] = airborne(arrays, p, i)
         episodes.visits[b, i] = 0
@@ -240,7 +240,7 @@ def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: 
     time = leg_time(arrays, p, i, at, j, length)
     if is_out_of_range(arrays, p, i, j, episodes.flown[b, i] + air_length(arrays, p, i, length, time)):
         return BARRED if is_barred(arrays, p, i, at, j) else OUT_OF_RANGE
-    if is_late(clock + time, arrays.deadline[p, j]):
+    if is_late(clock + time, arrays.areas[p, j].deadline):
         return TOO_LATE
     if is_committed_elsewhere(arrays, p, i, episodes.visits[b, i], j):
         return COMMITTED_ELSEWHERE
@@ -258,10 +258,10 @@ def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: 
 @compiled
 def promised(arrays: ProblemArrays, episodes: Episodes, b: int, i: int) -> int:
     """Return the target that UAV `i` is committed to next, if that visit is allowed; else N."""
-    p, visits, home = episodes.problem[b], episodes.visits[b, i], arrays.level.shape[1]
+    p, visits, home = episodes.problem[b], episodes.visits[b, i], arrays.need.shape[1]
     if visits < arrays.committed.shape[2]:
         j = arrays.committed[p, i, visits]
-        if j != NONE and j != home and verdict(arrays, episodes, b, i, j) == ALLOWED:
+        if j not in (NONE, home) and verdict(arrays, episodes, b, i, j) == ALLOWED:
             return j
     return home
 
@@ -273,7 +273,7 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
     A UAV that has returned stays home and earns nothing. What is lost at the end is not in it
     (:func:`closing`).
     """
-    p, home = episodes.problem[b], arrays.level.shape[1]
+    p, home = episodes.problem[b], arrays.need.shape[1]
     if action == home:
         if episodes.ret[b, i]:
             return 0.0
@@ -283,7 +283,7 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
         episodes.ret[b, i] = True
         episodes.at[b, i] = home
         episodes.flown[b, i] += d
-        if not arrays.charge_return[p]:
+        if not arrays.terms[p].charge_return:
             return 0.0
         episodes.distance[b] += d
         return -cost_of(arrays, p, d)
@@ -294,7 +294,7 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
         unloaded = min(load, need)
         if unloaded > 0.0:
             # One of the two is used up; what is left of the other is seldom so little that it is rounding.
-            if 0.0 < max(load, need) - unloaded < arrays.crumb[p]:
+            if 0.0 < max(load, need) - unloaded < arrays.terms[p].crumb:
                 earned += unload(arrays, episodes, b, i, action, k, unloaded)
             else:
                 episodes.load[b, i, k], episodes.need[b, action, k] = load - unloaded, need - unloaded
@@ -302,7 +302,7 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
                 if has_bonus(arrays, p):
                     earned += bonus_of(arrays, p, action, k, need, unloaded)
     if decays(arrays, p):
-        earned *= discount(arrays, p, episodes.clock[b, i] - arrays.service[p, action])
+        earned *= discount(arrays, p, episodes.clock[b, i] - arrays.areas[p, action].service)
     episodes.satisfaction[b] += earned
     return earned - cost_of(arrays, p, d)
 
@@ -384,12 +384,10 @@ def close(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
     """Let every UAV that is still out fly home, and return what the end costs, 0 or less (section 10)."""
     charged = 0.0
     for i in range(episodes.ret.shape[1]):
-        charged += act(arrays, episodes, b, i, arrays.level.shape[1])
+        charged += act(arrays, episodes, b, i, arrays.need.shape[1])
     p = episodes.problem[b]
     if has_closing_cost(arrays, p):
-        charged -= closing_cost(
-            arrays, p, makespan_of(arrays, episodes, b), changes_of(arrays, episodes, b)
-        )
+        charged -= closing_cost(arrays, p, makespan_of(arrays, episodes, b), changes_of(arrays, episodes, b))
     return charged
 
 
@@ -516,7 +514,7 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
             close(arrays, state, 0)
         result.rule[b] = rule
         result.satisfaction[b], result.distance[b] = state.satisfaction[0], state.distance[0]
-        result.reward[b] = state.satisfaction[0] - arrays.weight[problem[b]] * state.distance[0]
+        result.reward[b] = state.satisfaction[0] - arrays.terms[problem[b]].weight * state.distance[0]
         result.makespan[b] = makespan_of(arrays, state, 0)
         result.changes[b] = changes_of(arrays, state, 0)
         if has_closing_cost(arrays, problem[b]):

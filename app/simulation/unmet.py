@@ -16,7 +16,7 @@ import numpy as np
 
 from app.domain.allocation import Relaxation, Unmet, UnmetCode
 from app.domain.problem import Problem
-from app.simulation.arrays import NONE, Floats, Integers, Limit, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
 from app.simulation.insertion import new_trial
@@ -73,8 +73,8 @@ def unmet_targets(
     open_targets = np.flatnonzero(plan.remaining.max(axis=1) > 0)
     if not len(open_targets):
         return ()
-    share = plan.remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
-    urgent = open_targets[np.argsort(-arrays.level[0, open_targets] * share, kind="stable")]
+    share = plan.remaining[open_targets].sum(axis=1) / arrays.areas["need_total"][0, open_targets]
+    urgent = open_targets[np.argsort(-arrays.areas["level"][0, open_targets] * share, kind="stable")]
     scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
     start = look_from_start(arrays, plan, open_targets)
     lookout = Lookout(arrays, plan, *scratch, hurry)
@@ -144,7 +144,7 @@ class _Evaluator:
                 return self._barred(j)
             least = _Remedy(carrier, 0, relaxation_for(self._problem, more_range=missing))
             return UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least
-        arrival, deadline = float(self._start.arrival[j]), float(self._arrays.deadline[0, j])
+        arrival, deadline = float(self._start.arrival[j]), float(self._arrays.areas["deadline"][0, j])
         if is_late(arrival, deadline):
             late = arrival - deadline
             least = _Remedy(fastest, 0, relaxation_for(self._problem, late={j: late}))
@@ -171,7 +171,7 @@ class _Evaluator:
         return UnmetCode.OUT_OF_RANGE, self._says.no_leg(), None
 
     def _carries(self, i: int, j: int) -> bool:
-        """Whether UAV `i` can be sent and carries, at first, something that target `j` still needs at the end."""
+        """Whether UAV `i` can be sent and carries, at first, what target `j` still needs at the end."""
         useful = (self._arrays.load[0, i] > 0) & (self._plan.remaining[j] > 0)
         return bool(useful.any() and not self._arrays.ret[0, i])
 
@@ -182,11 +182,11 @@ class _Evaluator:
         return bool((self._arrays.start_target[0, :, j] >= UNREACHABLE).all() and (into >= UNREACHABLE).all())
 
     def _too_long(self, i: int, j: int) -> tuple[UnmetCode, str, _Remedy | None]:
-        """Why UAV `i`, the first that could be there, may not fly to target `j` though it has range and time."""
+        """Why UAV `i`, the first that could be there, may not fly to target `j` in spite of that."""
         needs = needs_of(self._arrays, i, j)
         if int(direct_rule(self._arrays, i, j)) == HOME_TOO_LATE:
             return UnmetCode.AVAILABLE_UNTIL, self._says.available_until(i, needs.landing), None
-        if needs.aloft - needs.waiting <= farthest(float(self._arrays.limits[0, i, Limit.ENDURANCE])):
+        if needs.aloft - needs.waiting <= farthest(float(self._arrays.uavs["endurance"][0, i])):
             return UnmetCode.TOO_EARLY_TO_WAIT, self._says.too_early_to_wait(i, j, needs), None
         return UnmetCode.ENDURANCE, self._says.endurance(i, needs.aloft), None
 
@@ -229,7 +229,7 @@ class _Evaluator:
                 return self._unmet(j, code, says, remedy, outcome)
         code, says = UnmetCode.LOADS_USED, self._says.loads_used(None if now is None else now.gain)
         uav = None
-        possible = (places.uav[: AS_IS] != NONE).any()
+        possible = (places.uav[:AS_IS] != NONE).any()
         if places.left_over[0] and not possible and places.blocked[0] != NONE:
             uav, place, rule = places.blocked.tolist()
             code, says = _BLOCKED.get(rule, UnmetCode.OUT_OF_RANGE), self._says.blocked(uav, place, rule)

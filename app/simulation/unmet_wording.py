@@ -79,8 +79,8 @@ class Wording:
         """It opens too late to wait for."""
         opens = self._problem.targets[j].earliest
         return (
-            f"it opens at {opens:.6g}: {self._uav(i)} would wait {needs.waiting:.6g} in the air, be there for "
-            f"{needs.aloft:.6g} in all, and has {self._usable(i):.6g}"
+            f"it opens at {opens:.6g}: {self._uav(i)} would wait {needs.waiting:.6g} in the air, where it would "
+            f"be for {needs.aloft:.6g} in all, and has {self._usable(i):.6g}"
         )
 
     def available_until(self, i: int, landing: float) -> str:
@@ -89,8 +89,9 @@ class Wording:
         return f"{self._uav(i)} would land at {landing:.6g}, and is available until {until or 0.0:.6g}"
 
     def blocked(self, i: int, place: int, rule: int) -> str:
-        """A UAV with something left over must not fly there, for a reason that is not range, time or steps."""
-        return f"{self._uav(i)} has some of it left over; a visit {self._where(i, place)} is not allowed: {RULES[rule]}"
+        """A UAV with something left over must not fly there, whatever range, time and steps it has."""
+        where = self._where(i, place)
+        return f"{self._uav(i)} has some of it left over; a visit {where} is not allowed: {RULES[rule]}"
 
     def _usable(self, i: int) -> float:
         uav = self._problem.uavs[i]

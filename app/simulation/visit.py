@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.domain.problem import ROUNDING, TOLERANCE
-from app.simulation.arrays import NONE, Flags, Floats, Limit, ProblemArrays, Term
+from app.simulation.arrays import NONE, Flags, Floats, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.legs import UNREACHABLE
 
@@ -61,46 +61,40 @@ RULES = {
 }
 """Rules that an action can break, in words."""
 
-_TIMED, _IN_WIND, _DECAY, _BONUS = int(Term.TIMED), int(Term.IN_WIND), int(Term.DECAY), int(Term.BONUS)
-_MAKESPAN, _CHANGE = int(Term.MAKESPAN), int(Term.CHANGE)
-_READY, _UNTIL, _AIRBORNE = int(Limit.READY), int(Limit.UNTIL), int(Limit.AIRBORNE)
-_ENDURANCE, _WATCHED, _ON_GROUND = int(Limit.ENDURANCE), int(Limit.WATCHED), int(Limit.ON_GROUND)
-_START_HOME_TIME = int(Limit.START_HOME_TIME)
-
 
 @inlined
 def leg(arrays: ProblemArrays, p: int, i: int, at: int, j: int) -> float:
     """Length of the leg to a target, over ground (rule 1)."""
     return (
-        arrays.start_target[p, i, j] if at == START else arrays.between[p, arrays.leg_class[p, i], at, j]
+        arrays.start_target[p, i, j] if at == START else arrays.between[p, arrays.uavs[p, i].leg_class, at, j]
     )
 
 
 @inlined
 def leg_time(arrays: ProblemArrays, p: int, i: int, at: int, j: int, length: float) -> float:
     """Time of the leg to a target, whose length is known (rule 1)."""
-    if arrays.terms[p, _TIMED] == 0.0:
-        time = length / arrays.speed[p, i]
+    if not arrays.terms[p].timed:
+        time = length / arrays.uavs[p, i].speed
     elif at == START:
         time = arrays.start_time[p, i, j]
     else:
-        time = arrays.between_time[p, arrays.leg_class[p, i], at, j]
+        time = arrays.between_time[p, arrays.uavs[p, i].leg_class, at, j]
     return time
 
 
 @inlined
 def air_length(arrays: ProblemArrays, p: int, i: int, length: float, time: float) -> float:
     """Length of a leg in the air, which is what range counts (rule 1)."""
-    in_wind = arrays.terms[p, _IN_WIND] != 0.0 and length < UNREACHABLE
-    return time * arrays.speed[p, i] if in_wind else length
+    in_wind = arrays.terms[p].in_wind and length < UNREACHABLE
+    return time * arrays.uavs[p, i].speed if in_wind else length
 
 
 @inlined
 def way_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
     """Length of the leg to the UAV's starting point; 0 where there is none."""
     if at == START:
-        distance = arrays.start_home[p, i]
-    elif at == arrays.level.shape[1]:
+        distance = arrays.uavs[p, i].start_home
+    elif at == arrays.need.shape[1]:
         distance = 0.0
     else:
         distance = arrays.home[p, i, at]
@@ -110,12 +104,12 @@ def way_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
 @inlined
 def time_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
     """Time until the UAV has landed, by the leg to its starting point where it must return."""
-    if not arrays.return_to_base[p] or at == arrays.level.shape[1]:
+    if not arrays.terms[p].return_to_base or at == arrays.need.shape[1]:
         time = 0.0
-    elif arrays.terms[p, _TIMED] == 0.0:
-        time = way_home(arrays, p, i, at) / arrays.speed[p, i]
+    elif not arrays.terms[p].timed:
+        time = way_home(arrays, p, i, at) / arrays.uavs[p, i].speed
     elif at == START:
-        time = arrays.limits[p, i, _START_HOME_TIME]
+        time = arrays.uavs[p, i].start_home_time
     else:
         time = arrays.home_time[p, i, at]
     return time
@@ -124,13 +118,13 @@ def time_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
 @inlined
 def ready(arrays: ProblemArrays, p: int, i: int) -> float:
     """Clock of a UAV at the start."""
-    return arrays.limits[p, i, _READY]
+    return arrays.uavs[p, i].ready
 
 
 @inlined
 def airborne(arrays: ProblemArrays, p: int, i: int) -> float:
     """Time that a UAV has been in the air at the start."""
-    return arrays.limits[p, i, _AIRBORNE]
+    return arrays.uavs[p, i].airborne
 
 
 @inlined
@@ -148,7 +142,7 @@ def is_barred(arrays: ProblemArrays, p: int, i: int, at: int, j: int) -> bool:
 @inlined
 def is_out_of_range(arrays: ProblemArrays, p: int, i: int, j: int, flown: float) -> bool:
     """Whether a visit exceeds the range (rule 2), by the air length flown on arrival."""
-    return flown_with_return(arrays, p, i, j, flown) > farthest(arrays.voyage[p, i])
+    return flown_with_return(arrays, p, i, j, flown) > farthest(arrays.uavs[p, i].voyage)
 
 
 @inlined
@@ -160,12 +154,20 @@ def is_late(arrival: float, deadline: float) -> bool:
 @inlined
 def is_watched(arrays: ProblemArrays, p: int, i: int) -> bool:
     """Whether a UAV has an endurance, or a time to have landed by: only then its time in the air counts."""
-    return arrays.limits[p, i, _WATCHED] != 0.0
+    return arrays.uavs[p, i].watched
 
 
 @inlined
 def aloft_after(
-    arrays: ProblemArrays, p: int, i: int, first: bool, aloft: float, clock: float, arrival: float, end: float, j: int
+    arrays: ProblemArrays,
+    p: int,
+    i: int,
+    first: bool,
+    aloft: float,
+    clock: float,
+    arrival: float,
+    end: float,
+    j: int,
 ) -> float:
     """Time in the air at the end of a visit (rule 3); a flight that begins with it waits on the ground.
 
@@ -183,21 +185,21 @@ def aloft_after(
         The target.
     """
     time = aloft + (end - clock)
-    if first and arrays.limits[p, i, _ON_GROUND] != 0.0:
-        time -= max(0.0, arrays.earliest[p, j] - arrival)
+    if first and arrays.uavs[p, i].on_ground:
+        time -= max(0.0, arrays.areas[p, j].earliest - arrival)
     return time
 
 
 @inlined
 def exceeds_endurance(arrays: ProblemArrays, p: int, i: int, j: int, aloft: float) -> bool:
     """Whether a visit exceeds the endurance (rule 2), by the time in the air at its end."""
-    return aloft + time_home(arrays, p, i, j) > farthest(arrays.limits[p, i, _ENDURANCE])
+    return aloft + time_home(arrays, p, i, j) > farthest(arrays.uavs[p, i].endurance)
 
 
 @inlined
 def lands_late(arrays: ProblemArrays, p: int, i: int, j: int, end: float) -> bool:
     """Whether a UAV would land after ``available_until`` (rule 2), by the clock at the end of a visit."""
-    return end + time_home(arrays, p, i, j) > latest(arrays.limits[p, i, _UNTIL])
+    return end + time_home(arrays, p, i, j) > latest(arrays.uavs[p, i].until)
 
 
 @inlined
@@ -224,13 +226,13 @@ def latest(deadline: float, tolerance: float = TOLERANCE) -> float:
 @inlined
 def begin_after(arrays: ProblemArrays, p: int, j: int, arrival: float) -> float:
     """Time at which a visit begins: who arrives before its earliest time waits (rule 1)."""
-    return max(arrival, arrays.earliest[p, j])
+    return max(arrival, arrays.areas[p, j].earliest)
 
 
 @inlined
 def departure_after(arrays: ProblemArrays, p: int, j: int, arrival: float) -> float:
     """Time at which a visit has ended (rule 3)."""
-    return begin_after(arrays, p, j, arrival) + arrays.service[p, j]
+    return begin_after(arrays, p, j, arrival) + arrays.areas[p, j].service
 
 
 @inlined
@@ -261,10 +263,10 @@ def earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
     Its need is not nothing. To it comes :func:`bonus_of`, material by material, and time takes some of both
     (:func:`discount`).
     """
-    if arrays.terms[p, _BONUS] == 0.0:
-        earned = arrays.level[p, j] * amount / arrays.need_total[p, j]
+    if arrays.terms[p].bonus == 0.0:
+        earned = arrays.areas[p, j].level * amount / arrays.areas[p, j].need_total
     else:
-        earned = arrays.unit[p, j] * amount
+        earned = arrays.areas[p, j].unit * amount
     return earned
 
 
@@ -272,58 +274,60 @@ def earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
 def bonus_of(arrays: ProblemArrays, p: int, j: int, k: int, need: float, amount: float) -> float:
     """What an amount of a material earns above :func:`earned_by`, as far as it is of the first share."""
     first = min(amount, max(0.0, need - arrays.beyond[p, j, k]))
-    return arrays.terms[p, _BONUS] * arrays.unit[p, j] * first
+    return arrays.terms[p].bonus * arrays.areas[p, j].unit * first
 
 
 @inlined
 def most_earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
-    """Satisfaction that an amount unloaded at a target brings at most, at whatever time and of whichever share."""
-    return earned_by(arrays, p, j, amount) * (1.0 + arrays.terms[p, _BONUS])
+    """Satisfaction that an amount unloaded at a target brings at most, at whatever time."""
+    return earned_by(arrays, p, j, amount) * (1.0 + arrays.terms[p].bonus)
 
 
 @inlined
 def has_bonus(arrays: ProblemArrays, p: int) -> bool:
     """Whether the first share of a need earns more than the rest."""
-    return arrays.terms[p, _BONUS] != 0.0
+    return arrays.terms[p].bonus != 0.0
 
 
 @inlined
 def decays(arrays: ProblemArrays, p: int) -> bool:
     """Whether what a delivery earns falls with time."""
-    return arrays.terms[p, _DECAY] != 0.0
+    return arrays.terms[p].decay != 0.0
 
 
 @inlined
 def discount(arrays: ProblemArrays, p: int, begin: float) -> float:
     """Share that is left of what a delivery earns at a time (rule 5)."""
-    return 2.0 ** (-begin * arrays.terms[p, _DECAY]) if decays(arrays, p) else 1.0
+    return 2.0 ** (-begin * arrays.terms[p].decay) if decays(arrays, p) else 1.0
 
 
 @inlined
 def cost_of(arrays: ProblemArrays, p: int, distance: float) -> float:
     """Reward that a distance costs (rule 5)."""
-    return arrays.weight[p] * distance
+    return arrays.terms[p].weight * distance
 
 
 @inlined
 def has_closing_cost(arrays: ProblemArrays, p: int) -> bool:
     """Whether reward is lost for what is known at the end alone: the makespan, and changes."""
-    return arrays.terms[p, _MAKESPAN] != 0.0 or arrays.terms[p, _CHANGE] != 0.0
+    return arrays.terms[p].makespan != 0.0 or arrays.terms[p].change != 0.0
 
 
 @inlined
 def closing_cost(arrays: ProblemArrays, p: int, makespan: float, changes: float) -> float:
     """Reward lost for the makespan and for changes (section 10)."""
-    return arrays.terms[p, _MAKESPAN] * makespan + arrays.terms[p, _CHANGE] * changes
+    return arrays.terms[p].makespan * makespan + arrays.terms[p].change * changes
 
 
 def worths(arrays: ProblemArrays) -> Floats:
-    """Return what a unit of material earns at most at each target of a problem, (N,); 0 where none is needed."""
-    needed = arrays.need_total[0] > 0
-    if has_bonus.py_func(arrays, 0):
+    """Return what a unit of material earns at most at each target, (N,); 0 where none is needed."""
+    needed = arrays.areas["need_total"][0] > 0
+    if arrays.terms["bonus"][0] != 0.0:
         first = (arrays.need[0] > arrays.beyond[0]).any(axis=1)
-        return np.where(needed, arrays.unit[0] * (1.0 + arrays.terms[0, _BONUS] * first), 0.0)
-    return np.where(needed, arrays.level[0], 0.0) / np.where(needed, arrays.need_total[0], 1.0)
+        return np.where(needed, arrays.areas["unit"][0] * (1.0 + arrays.terms["bonus"][0] * first), 0.0)
+    return np.where(needed, arrays.areas["level"][0], 0.0) / np.where(
+        needed, arrays.areas["need_total"][0], 1.0
+    )
 
 
 def worth_by_material(arrays: ProblemArrays) -> Floats:
@@ -333,15 +337,15 @@ def worth_by_material(arrays: ProblemArrays) -> Floats:
     at most that part of it.
     """
     need = arrays.need[0]
-    first = np.where(need > arrays.beyond[0], 1.0 + arrays.terms[0, _BONUS], 1.0)
-    return arrays.unit[0][:, None] * need * first
+    first = np.where(need > arrays.beyond[0], 1.0 + arrays.terms["bonus"][0], 1.0)
+    return arrays.areas["unit"][0][:, None] * need * first
 
 
 def limits(arrays: ProblemArrays, tolerance: float = TOLERANCE) -> tuple[Floats, Floats]:
     """Return ranges (M,) and deadlines (N,) of the first problem with a tolerance."""
     return (
-        arrays.voyage[0] * (1.0 + tolerance),
-        arrays.deadline[0] + np.abs(arrays.deadline[0]) * tolerance,
+        arrays.uavs["voyage"][0] * (1.0 + tolerance),
+        arrays.areas["deadline"][0] + np.abs(arrays.areas["deadline"][0]) * tolerance,
     )
 
 
@@ -356,15 +360,15 @@ def first_visits(arrays: ProblemArrays, tolerance: float = TOLERANCE) -> Flags:
     Flags
         (M, N).
     """
-    speed, timed = arrays.speed[0][:, None], arrays.terms[0, _TIMED] != 0.0
+    speed, timed = arrays.uavs["speed"][0][:, None], bool(arrays.terms["timed"][0])
     length = arrays.start_target[0]
     time = arrays.start_time[0] if timed else length / speed
-    if arrays.terms[0, int(Term.METRIC)] == 0.0:
-        between, of = arrays.between[0], arrays.leg_class[0]
+    if not arrays.terms["metric"][0]:
+        between, of = arrays.between[0], arrays.uavs["leg_class"][0]
         length = np.minimum(length, length.min(axis=1)[:, None] + between.min(axis=1)[of])
         over = arrays.between_time[0].min(axis=1)[of] if timed else between.min(axis=1)[of] / speed
         time = np.minimum(time, time.min(axis=1)[:, None] + over)
-    flown = arrays.dis[0][:, None] + (time * speed if arrays.terms[0, _IN_WIND] != 0.0 else length)
+    flown = arrays.uavs["dis"][0][:, None] + (time * speed if arrays.terms["in_wind"][0] else length)
     ranges, deadlines = limits(arrays, tolerance)
     in_range = flown + arrays.kept_range[0] <= ranges[:, None]
-    return in_range & (arrays.limits[0, :, _READY, None] + time <= deadlines)
+    return in_range & (arrays.uavs["ready"][0][:, None] + time <= deadlines)

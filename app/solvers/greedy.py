@@ -82,7 +82,7 @@ def _take_turns(
 
     `turn` has the step and the UAV whose turn is next, `left` the sum of what each target still needs, (N,).
     """
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     for _ in range(turns):
         s, i = turn[0], turn[1]
         chosen = _best_visit(arrays, episodes, left, i)
@@ -101,18 +101,18 @@ def _take_turns(
 @compiled
 def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int) -> int:
     """Return the target whose visit earns most for UAV `i` now; N where none earns anything."""
-    best, chosen = 0.0, arrays.level.shape[1]
+    best, chosen = 0.0, arrays.need.shape[1]
     if episodes.ret[0, i]:
         return chosen
     carried = episodes.load[0, i].sum()
-    back = leg_home(arrays, episodes, 0, i) if arrays.charge_return[0] else 0.0
-    for j in range(arrays.level.shape[1]):
+    back = leg_home(arrays, episodes, 0, i) if arrays.terms[0].charge_return else 0.0
+    for j in range(arrays.need.shape[1]):
         # What it earns at most is known at once, and mostly too little; the margin is for rounding errors.
         most = min(carried, left[j]) * (1.0 + _ROUNDING)
         if most <= 0.0:
             continue
         way = leg_to(arrays, episodes, 0, i, j)
-        if arrays.charge_return[0]:
+        if arrays.terms[0].charge_return:
             way += way_home(arrays, 0, i, j) - back
         cost = cost_of(arrays, 0, way)
         if most_earned_by(arrays, 0, j, most) - cost <= best:

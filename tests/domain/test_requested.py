@@ -144,7 +144,7 @@ def test_a_met_area_needs_nothing_and_does_not_set_the_scale():
         requested=(1.0,) * began.n_materials,
     )
     arrays = compile_problem(Problem(began.uavs, (met, *began.targets[1:])))
-    assert (arrays.need_total[0, 0], arrays.level[0, 0]) == (0.0, 0.0)
+    assert (arrays.areas["need_total"][0, 0], arrays.areas["level"][0, 0]) == (0.0, 0.0)
 
 
 def test_a_need_that_is_rounding_of_what_was_requested_is_none():

@@ -54,4 +54,4 @@ def test_what_pads_a_stack_is_never_part_of_a_visit(problem):
     assert stacked.shape == tuple(SIZES.values())
     assert stacked.ret[1, 1:].all()
     assert not stacked.need[1, 2:].any()
-    assert np.isinf(stacked.deadline[1, 2:]).all()
+    assert np.isinf(stacked.areas["deadline"][1, 2:]).all()

@@ -42,7 +42,7 @@ def solve(problem, *, seed=1, stop=never, report=quiet, **parameters):
 
 def current_actions(search):
     """The current plan, not the incumbent, as joint actions (S, M)."""
-    routes, home = search.routes, search.arrays.level.shape[1]
+    routes, home = search.routes, search.arrays.areas["level"].shape[1]
     used = np.arange(routes.target.shape[1])[None, :] < routes.length[:, None]
     return np.where(used, routes.target, home).T.copy()
 
@@ -129,7 +129,7 @@ def test_undoing_leaves_no_trace():
 def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
-        scale = max(float(search.arrays.level.max()), 1e-9)
+        scale = max(float(search.arrays.areas["level"].max()), 1e-9)
         anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0)
         assert_evaluated(search)
         assert search.routes.total[SATISFACTION] <= search.most

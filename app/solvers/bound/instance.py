@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import Problem
-from app.simulation.arrays import Flags, Floats, ProblemArrays, Term, compile_problem
+from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
 from app.simulation.visit import worth_by_material
 from app.solvers.scale import largest_level
 
@@ -52,19 +52,19 @@ def new_instance(problem: Problem) -> Instance:
     """Scale a problem."""
     arrays = compile_problem(problem)
     need, load = arrays.need[0], arrays.load[0]
-    wanted = arrays.need_total[0] > 0
+    wanted = arrays.areas["need_total"][0] > 0
     scale = largest_level(arrays)
-    if arrays.terms[0, Term.BONUS] == 0.0:
-        earned = rounded(arrays.level[0] / scale)
-        worth = earned[:, None] * (need / np.where(wanted, arrays.need_total[0], 1.0)[:, None])
+    if arrays.terms["bonus"][0] == 0.0:
+        earned = rounded(arrays.areas["level"][0] / scale)
+        worth = earned[:, None] * (need / np.where(wanted, arrays.areas["need_total"][0], 1.0)[:, None])
     else:
         worth = rounded(worth_by_material(arrays) / scale)
-    price = float(rounded(arrays.weight / scale)[0])
+    price = float(rounded(arrays.terms["weight"] / scale)[0])
     out = ~arrays.ret[0]
-    charged = out & bool(arrays.charge_return[0])
+    charged = out & bool(arrays.terms["charge_return"][0])
     # As a product of matrices: with many materials much quicker than comparing each with each.
     useful = out[:, None] & ((load > 0).astype(np.float32) @ (need > 0).astype(np.float32).T > 0)
-    idle = np.where(charged, -price * arrays.start_home[0], 0.0)
+    idle = np.where(charged, -price * arrays.uavs["start_home"][0], 0.0)
     return Instance(arrays, scale, worth, need, load, price, idle, useful)
 
 

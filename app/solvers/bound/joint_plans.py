@@ -83,7 +83,7 @@ class JointPlans:
         if chosen[0] < 0:
             return
         steps, m = int(self._instance.arrays.max_steps[0]), len(chosen)
-        self.actions = np.full((steps, m), self._instance.arrays.level.shape[1], np.int64)
+        self.actions = np.full((steps, m), self._instance.arrays.areas["level"].shape[1], np.int64)
         for i, q in enumerate(chosen):
             self.actions[: length[q], i] = targets[q, : length[q]]
 
@@ -172,7 +172,7 @@ def _orders(
                 continue
             order[depth] = t
             if depth + 1 == s:
-                back = arrays.home[0, i, route[depth]] if arrays.charge_return[0] else 0.0
+                back = arrays.home[0, i, route[depth]] if arrays.terms[0].charge_return else 0.0
                 total = slack[at] + price * (way[depth + 1] + back) - cost[r]
                 if total <= room:
                     if found == most:

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Floats, Integers, Limit, ProblemArrays, Term
+from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.visit import latest, limits
+from app.simulation.visit import limits
 from app.solvers.bound.instance import Instance
 from app.solvers.protocol import StopCriterion
 from app.solvers.stop import never
@@ -78,7 +78,8 @@ def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSe
     for s in range(1, longest + 1):
         if stop():
             return None
-        members, distance, *before = _enumerate(s, *before, *given)
+        members, distance, *least = _enumerate(s, *before, *given)
+        before = (least[0], least[1], least[2])
         found.append((members, distance))
         if not len(distance):
             break  # A legal route begins with one that has a visit less, so no larger set has any.
@@ -133,34 +134,36 @@ class LegsOfUAV(NamedTuple):
 
 def legs_of_uav(arrays: ProblemArrays, i: int, targets: Integers) -> LegsOfUAV:
     """Write down what UAV `i` needs to fly to some targets, and what it has."""
-    speed, of = float(arrays.speed[0, i]), arrays.leg_class[0, i]
+    speed, of = float(arrays.uavs["speed"][0, i]), arrays.uavs["leg_class"][0, i]
     ranges, deadlines = limits(arrays, SLACK)
-    timed, in_wind = arrays.terms[0, Term.TIMED] != 0.0, arrays.terms[0, Term.IN_WIND] != 0.0
+    timed, in_wind = arrays.terms["timed"][0], arrays.terms["in_wind"][0]
     every = np.ix_(targets, targets)
     start, between = arrays.start_target[0, i, targets], arrays.between[0, of][every]
     start_time = arrays.start_time[0, i, targets] if timed else start / speed
     between_time = arrays.between_time[0, of][every] if timed else between / speed
-    if arrays.terms[0, Term.METRIC] == 0.0:
+    if not arrays.terms["metric"][0]:
         start, between = _least_over_others(start, between)
         start_time, between_time = _least_over_others(start_time, between_time)
-    home, must_return = arrays.home[0, i, targets], bool(arrays.return_to_base[0])
-    home_time = (arrays.home_time[0, i, targets] if timed else home / speed) if must_return else np.zeros(len(home))
-    until = float(arrays.limits[0, i, Limit.UNTIL])
+    home, must_return = arrays.home[0, i, targets], bool(arrays.terms["return_to_base"][0])
+    home_time = (
+        (arrays.home_time[0, i, targets] if timed else home / speed) if must_return else np.zeros(len(home))
+    )
+    until = float(arrays.uavs["until"][0, i])
     return LegsOfUAV(
         start=np.ascontiguousarray(start),
         between=np.ascontiguousarray(between),
-        home=home if arrays.charge_return[0] else np.zeros(len(home)),
+        home=home if arrays.terms["charge_return"][0] else np.zeros(len(home)),
         start_time=np.ascontiguousarray(start_time),
         between_time=np.ascontiguousarray(between_time),
         start_air=np.ascontiguousarray(start_time * speed if in_wind else start),
         between_air=np.ascontiguousarray(between_time * speed if in_wind else between),
-        reach=ranges[i] - arrays.dis[0, i] - arrays.kept_range[0, i, targets],
-        ready=float(arrays.limits[0, i, Limit.READY]),
-        earliest=arrays.earliest[0, targets],
+        reach=ranges[i] - arrays.uavs["dis"][0, i] - arrays.kept_range[0, i, targets],
+        ready=float(arrays.uavs["ready"][0, i]),
+        earliest=arrays.areas["earliest"][0, targets],
         latest=deadlines[targets],
-        service=arrays.service[0, targets],
-        land_by=latest.py_func(until, SLACK) - home_time,
-        simple=not timed and until == np.inf and not arrays.earliest[0, targets].any(),
+        service=arrays.areas["service"][0, targets],
+        land_by=until + abs(until) * SLACK - home_time,
+        simple=not timed and until == np.inf and not arrays.areas["earliest"][0, targets].any(),
         speed=speed,
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Term
 from app.solvers.bound.instance import Instance, safely
 from app.solvers.column_generation.packing import Packing, reachable, worth
 from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool
@@ -29,7 +28,7 @@ def route_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
         Asked every few milliseconds; HiGHS is told how long it leaves.
     """
     arrays = instance.arrays
-    if not always_whole(arrays) or arrays.terms[0, Term.METRIC] == 0.0:
+    if not always_whole(arrays) or not arrays.terms["metric"][0]:
         return np.inf
     pool = new_pool(arrays, 4 * CAPACITY)
     pricing = Pricing(arrays, pool, room=_ROOM, effort=np.inf, tolerance=2.0 * TOLERANCE)

@@ -92,7 +92,7 @@ class Labels(NamedTuple):
 
 def neighbourhoods_of(arrays: ProblemArrays, stop: StopCriterion) -> NgNeighbourhoods | None:
     """Find the neighbourhoods of the first problem of a stack; None if it was stopped."""
-    n = arrays.level.shape[1]
+    n = arrays.areas["level"].shape[1]
     leg = arrays.between[0].min(axis=0)
     size = min(_MEMORY, n)
     near = np.zeros((n, min(_MOST_MEMORY, n)), np.int64)

@@ -63,7 +63,7 @@ class Pool(NamedTuple):
 
 def often_whole(arrays: ProblemArrays) -> bool:
     """Whether most UAVs carry enough for most targets, so that combining routes is worth its time."""
-    active, wanted = ~arrays.ret[0], arrays.need_total[0] > 0
+    active, wanted = ~arrays.ret[0], arrays.areas["need_total"][0] > 0
     load, need = arrays.load[0][active], arrays.need[0][wanted]
     if not (len(load) and len(need)):
         return False

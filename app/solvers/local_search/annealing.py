@@ -81,10 +81,10 @@ def replica(search: Search) -> Search:
 
 def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float, pool: Pool) -> Search:
     routes = empty_routes(arrays)
-    if arrays.charge_return[0]:
-        at_home = arrays.start_home[0][~arrays.ret[0]]
+    if arrays.terms["charge_return"][0]:
+        at_home = arrays.uavs["start_home"][0][~arrays.ret[0]]
         routes.total[DISTANCE] = at_home.sum()
-    best = np.array([-arrays.weight[0] * routes.total[DISTANCE] - routes.total[CLOSING]])
+    best = np.array([-arrays.terms["weight"][0] * routes.total[DISTANCE] - routes.total[CLOSING]])
     return Search(
         arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most, pool
     )
@@ -100,7 +100,7 @@ def set_routes(search: Search, actions: Integers) -> None:
     actions
         (S', M) joint actions of a legal plan.
     """
-    home = search.arrays.level.shape[1]
+    home = search.arrays.areas["level"].shape[1]
     for i in range(actions.shape[1]):
         targets = actions[:, i]
         set_route(search, i, np.ascontiguousarray(targets[targets < home]))
@@ -110,7 +110,7 @@ def set_routes(search: Search, actions: Integers) -> None:
 def actions_of(search: Search) -> Integers:
     """Return the incumbent as joint actions, (S, M)."""
     steps = search.best_target.shape[1]
-    home = search.arrays.level.shape[1]
+    home = search.arrays.areas["level"].shape[1]
     used = np.arange(steps)[None, :] < search.best_length[:, None]
     return np.where(used, search.best_target, home).T.copy()
 
@@ -138,7 +138,7 @@ def _apply_whole(arrays: ProblemArrays, routes: Routes, change: Change) -> None:
 def keep_best(search: Search) -> bool:
     """Make the current plan the incumbent if it is legal and better."""
     routes = search.routes
-    cost = search.arrays.weight[0] * routes.total[DISTANCE] + routes.total[CLOSING]
+    cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
     reward = routes.total[SATISFACTION] - cost
     rounding = ROUNDING * (routes.total[SATISFACTION] + cost)
     if routes.total[USELESS] > 0.5 or reward <= search.best[0] + rounding:
@@ -204,7 +204,7 @@ def anneal(
         Whether the routes that a kept change makes go to the search's pool.
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
-    weight = arrays.weight[0]
+    weight = arrays.terms[0].weight
     sum_up(arrays, routes)
     kept = 0
     temperature = hot

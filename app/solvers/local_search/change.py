@@ -134,7 +134,7 @@ def propose(routes: Routes, change: Change, side: int, i: int, begin: int, lengt
 
 @compiled
 def feasible(arrays: ProblemArrays, change: Change) -> bool:
-    """Whether rule 2 allows the proposed routes, whatever they unload; works out their distances and times."""
+    """Whether rule 2 allows the proposed routes, whatever they unload; works out their times."""
     for side in range(2):
         i = change.uav[side]
         if i != NONE and not lay(
@@ -281,7 +281,10 @@ def _exchange(routes: Routes, change: Change) -> None:
                 change.clock[side, s + 1],
             )
             change.flown[side, s + 1], change.clock[side, s + 1] = flown, clock
-            routes.aloft[i, s + 1], change.aloft[side, s + 1] = change.aloft[side, s + 1], routes.aloft[i, s + 1]
+            routes.aloft[i, s + 1], change.aloft[side, s + 1] = (
+                change.aloft[side, s + 1],
+                routes.aloft[i, s + 1],
+            )
         routes.landing[i], change.landing[side] = change.landing[side], routes.landing[i]
         routes.changes[i], change.changes[side] = change.changes[side], routes.changes[i]
 
@@ -317,7 +320,7 @@ def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) 
             if has_bonus(arrays, 0):
                 earned += bonus_of(arrays, 0, j, k, need, unloaded)
     if decays(arrays, 0):
-        earned *= discount(arrays, 0, routes.clock[i, s + 1] - arrays.service[0, j])
+        earned *= discount(arrays, 0, routes.clock[i, s + 1] - arrays.areas[0, j].service)
     routes.earned[slot], routes.useless[slot] = earned, useless
     routes.total[SATISFACTION] += earned
     if useless:

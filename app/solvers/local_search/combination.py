@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.simulation.arrays import Integers, Term
+from app.simulation.arrays import Integers
 from app.solvers.column_generation.diving import dive
 from app.solvers.column_generation.packing import Packing, Relaxation, next_reward
 from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool, often_whole, pour, thin
@@ -65,7 +65,7 @@ class Combination:
             self._visits = int(searches[0].routes.length.sum())
             self._pricing = Pricing(arrays, self.searches[0].pool)
             self._rng = np.random.default_rng(_SEED)
-            self._complete = always_whole(arrays) and arrays.terms[0, Term.METRIC] != 0.0
+            self._complete = always_whole(arrays) and arrays.terms["metric"][0]
             if left < math.inf:
                 self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
 

@@ -48,7 +48,7 @@ class Neighbourhood(NamedTuple):
 
 def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     """Make the lists for the first problem of a stack; ``active`` or ``wanted`` may be empty."""
-    wanted = np.flatnonzero(arrays.need_total[0] > 0)
+    wanted = np.flatnonzero(arrays.areas["need_total"][0] > 0)
     length = max(1, min(NEAR, len(wanted) - 1))
     between = arrays.between[0].min(axis=0)
     np.fill_diagonal(between, np.inf)
@@ -87,7 +87,7 @@ def _find_reluctant(arrays: ProblemArrays, near_start: Integers, reluctant: Flag
             for k in range(arrays.load.shape[2]):
                 unloaded += min(arrays.load[0, i, k], arrays.need[0, j, k])
             way = leg(arrays, 0, i, START, j)
-            if arrays.charge_return[0]:
+            if arrays.terms[0].charge_return:
                 way += way_home(arrays, 0, i, j) - way_home(arrays, 0, i, START)
             if unloaded > 0.0 and earned_by(arrays, 0, j, unloaded) < cost_of(arrays, 0, way):
                 reluctant[i] = True

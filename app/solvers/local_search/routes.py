@@ -12,12 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays, Term
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.simulation.visit import (
     START,
     air_length,
-    airborne,
     aloft_after,
     closing_cost,
     departure_after,
@@ -31,12 +30,9 @@ from app.simulation.visit import (
     lands_late,
     leg,
     leg_time,
-    ready,
     time_home,
     way_home,
 )
-
-_IN_WIND = int(Term.IN_WIND)
 
 SATISFACTION, DISTANCE, USELESS, CLOSING = 0, 1, 2, 3
 """Columns of ``Routes.total``."""
@@ -89,14 +85,12 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
     m, n, k = arrays.shape
     steps = int(arrays.max_steps[0])
     slots = steps * m
-    start = np.array([ready.py_func(arrays, 0, i) for i in range(m)])
-    aloft = np.array([airborne.py_func(arrays, 0, i) for i in range(m)])
     routes = Routes(
         target=np.zeros((m, steps), np.int64),
         length=np.zeros(m, np.int64),
         flown=np.zeros((m, steps + 1)),
-        clock=np.repeat(start[:, None], steps + 1, axis=1),
-        aloft=np.repeat(aloft[:, None], steps + 1, axis=1),
+        clock=np.repeat(arrays.uavs["ready"][0][:, None], steps + 1, axis=1),
+        aloft=np.repeat(arrays.uavs["airborne"][0][:, None], steps + 1, axis=1),
         load=np.zeros((slots, k)),
         need=np.zeros((slots, k)),
         earned=np.zeros(slots),
@@ -108,7 +102,7 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
         changes=np.zeros(m),
         total=np.zeros(4),
     )
-    if has_closing_cost.py_func(arrays, 0):
+    if arrays.terms["makespan"][0] or arrays.terms["change"][0]:
         note_ends(arrays, routes)
     return routes
 
@@ -169,7 +163,7 @@ def lay(
     flown, clock, aloft
         (S+1,) overwritten from ``begin + 1`` on.
     """
-    most = farthest(arrays.voyage[0, i]) - arrays.dis[0, i]
+    most = farthest(arrays.uavs[0, i].voyage) - arrays.uavs[0, i].dis
     watched = is_watched(arrays, 0, i)
     for s in range(begin, length):
         j = targets[s]
@@ -180,7 +174,7 @@ def lay(
         if flown_with_return(arrays, 0, i, j, flown[s + 1]) > most:
             return False
         arrival = clock[s] + time
-        if is_late(arrival, arrays.deadline[0, j]) or is_committed_elsewhere(arrays, 0, i, s, j):
+        if is_late(arrival, arrays.areas[0, j].deadline) or is_committed_elsewhere(arrays, 0, i, s, j):
             return False
         clock[s + 1] = departure_after(arrays, 0, j, arrival)
         if watched:
@@ -207,13 +201,13 @@ def sum_up(arrays: ProblemArrays, routes: Routes) -> None:
 @compiled
 def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: int, flown: Floats) -> float:
     """Distance of a route as far as it costs reward."""
-    if arrays.terms[0, _IN_WIND] == 0.0:
+    if not arrays.terms[0].in_wind:
         distance = flown[length]
     else:
         distance = 0.0
         for s in range(length):
             distance += leg(arrays, 0, i, START if s == 0 else targets[s - 1], targets[s])
-    if arrays.charge_return[0] and not arrays.ret[0, i]:
+    if arrays.terms[0].charge_return and not arrays.ret[0, i]:
         distance += way_home(arrays, 0, i, START if length == 0 else targets[length - 1])
     return distance
 

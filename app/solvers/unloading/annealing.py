@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.plan import Actions
-from app.simulation.arrays import Floats, ProblemArrays
-from app.simulation.deliveries import NONE, Unloading, Visits, new_unloading, serve
+from app.simulation.arrays import NONE, Floats, ProblemArrays
+from app.simulation.deliveries import Unloading, Visits, new_unloading, serve
 from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
 from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, feasible, undo
@@ -77,7 +77,7 @@ def visits_of_routes(routes: Routes) -> Visits:
 def keep_if_best(planned: PlannedSearch) -> None:
     """Make the current plan the incumbent if it is better."""
     search, routes = planned.search, planned.search.routes
-    cost = search.arrays.weight[0] * routes.total[DISTANCE] + routes.total[CLOSING]
+    cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
     reward = planned.tally[SATISFACTION] - cost
     rounding = ROUNDING * (planned.tally[SATISFACTION] + cost)
     if reward > search.best[0] + rounding:
@@ -124,7 +124,7 @@ def anneal_planned(
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
-        price = arrays.weight[0] * extra + closing
+        price = arrays.terms[0].weight * extra + closing
         least = temperature * math.log(1.0 - rng.random())
         if search.most - tally[SATISFACTION] - price < least:
             continue

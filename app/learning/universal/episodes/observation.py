@@ -77,11 +77,11 @@ class VisitGains(NamedTuple):
 def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
     """Return what distances, rewards and times are divided by, (P,) each; never 0."""
     far = np.maximum(_longest(arrays.start_target), _longest(arrays.between))
-    span = np.maximum(np.maximum(far, _longest(arrays.home)), arrays.start_home.max(axis=1))
+    span = np.maximum(np.maximum(far, _longest(arrays.home)), arrays.uavs["start_home"].max(axis=1))
     span = np.where(span > 0, span, 1.0)
-    level = np.where(arrays.need_total > 0, arrays.level, 0.0).max(axis=1)
+    level = np.where(arrays.areas["need_total"] > 0, arrays.areas["level"], 0.0).max(axis=1)
     flying = ~arrays.ret
-    speed = np.where(flying, arrays.speed, 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
+    speed = np.where(flying, arrays.uavs["speed"], 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
     return span, np.where(level > 0, level, 1.0), span / np.where(speed > 0, speed, 1.0)
 
 
@@ -109,7 +109,7 @@ def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
     m, n, _ = arrays.shape
     span, level, time = scales(arrays)
     length = max(1, min(FOLLOW_UPS, n - 1))
-    between = np.where(arrays.need_total[:, None, :] > 0, arrays.between.min(axis=1), np.inf)
+    between = np.where(arrays.areas["need_total"][:, None, :] > 0, arrays.between.min(axis=1), np.inf)
     between[:, np.arange(n), np.arange(n)] = np.inf
     near = np.argsort(between, axis=2, kind="stable")[:, :, :length]
     return VisitGains(
@@ -224,7 +224,7 @@ def observe(
         travel = leg_time(arrays, p, i, episodes.at[b, i], j, d)
         air = air_length(arrays, p, i, d, travel)
         reach = flown_with_return(arrays, p, i, j, episodes.flown[b, i] + air)
-        deadline = arrays.deadline[p, j]
+        deadline = arrays.areas[p, j].deadline
 
         best, second, rival, able, supply = FORBIDDEN, FORBIDDEN, -1, 0, 0.0
         for other in range(m):
@@ -263,16 +263,16 @@ def observe(
         row[4] = squash(net / scale) if allowed else -1.0
         row[5] = unloaded / need if need > 0.0 else 0.0
         row[6] = unloaded / load if load > 0.0 else 0.0
-        row[7] = need / arrays.need_total[p, j] if arrays.need_total[p, j] > 0.0 else 0.0
-        row[8] = min(arrays.level[p, j] / scale, LARGEST_LEVEL)
-        row[9] = clip((arrays.voyage[p, i] - reach) / span, -1.0, 3.0)
+        row[7] = need / arrays.areas[p, j].need_total if arrays.areas[p, j].need_total > 0.0 else 0.0
+        row[8] = min(arrays.areas[p, j].level / scale, LARGEST_LEVEL)
+        row[9] = clip((arrays.uavs[p, i].voyage - reach) / span, -1.0, 3.0)
         row[10] = home_then / span
         row[11] = min((d + home_then - home_now) / span, _FAR)
         row[12] = 1.0 if deadline < np.inf else 0.0
         row[13] = (
             clip((deadline - episodes.clock[b, i] - travel) / time, -2.0, 4.0) if deadline < np.inf else 0.0
         )
-        row[14] = clip(arrays.service[p, j] / time, 0.0, 4.0)
+        row[14] = clip(arrays.areas[p, j].service / time, 0.0, 4.0)
         row[15] = clip(travel / time, 0.0, 4.0)
         row[16] = squash(best / scale) if able > 0 else -1.0
         row[17] = squash(second / scale) if able > 1 else -1.0
@@ -329,23 +329,23 @@ def _observe_self(
         needed += need_k
         covered += min(need_k, supply_k)
     home_now = leg_home(arrays, episodes, b, i)
-    left = arrays.voyage[p, i] - episodes.flown[b, i]
+    left = arrays.uavs[p, i].voyage - episodes.flown[b, i]
     own[3] = load / most if most > 0.0 else 0.0
     own[4] = load / start_load if start_load > 0.0 else 0.0
     own[5] = clip(left / span, 0.0, 4.0)
     own[6] = home_now / span
-    own[7] = squash(arrays.weight[p] * home_now / scale) if arrays.charge_return[p] else 0.0
-    own[8] = 1.0 if arrays.charge_return[p] else 0.0
-    own[9] = 1.0 if arrays.return_to_base[p] else 0.0
+    own[7] = squash(arrays.terms[p].weight * home_now / scale) if arrays.terms[p].charge_return else 0.0
+    own[8] = 1.0 if arrays.terms[p].charge_return else 0.0
+    own[9] = 1.0 if arrays.terms[p].return_to_base else 0.0
     own[10] = steps_left / steps
     own[11] = 1.0 / steps_left
     own[12] = 1.0 if steps_left == 1 else 0.0
     own[13] = clip(episodes.clock[b, i] / time, 0.0, 4.0)
-    own[14] = clip(arrays.speed[p, i] * time / span, 0.0, 4.0)
+    own[14] = clip(arrays.uavs[p, i].speed * time / span, 0.0, 4.0)
     own[15] = m / (m + n)
     own[16] = covered / needed if needed > 0.0 else 0.0
     own[17] = covered / swarm if swarm > 0.0 else 0.0
-    own[18] = squash(arrays.weight[p] * span / scale)
+    own[18] = squash(arrays.terms[p].weight * span / scale)
     own[19] = out / m
     own[20] = (i + 0.5) / m
     own[21] = 1.0 / n
@@ -379,7 +379,9 @@ def _follow_up(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: 
         way = leg(arrays, p, i, j, then)
         time = leg_time(arrays, p, i, j, then, way)
         air = air_length(arrays, p, i, way, time)
-        if is_out_of_range(arrays, p, i, then, flown + air) or is_late(clock + time, arrays.deadline[p, then]):
+        if is_out_of_range(arrays, p, i, then, flown + air) or is_late(
+            clock + time, arrays.areas[p, then].deadline
+        ):
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):

@@ -35,7 +35,7 @@ def fly_routes(
         UAV that has not moved in the end, or ``NOBODY``; its column of the plan is left as it is.
     """
     m, steps = routes.shape
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     reset_one(arrays, episodes, 0)
     place[:] = 0
     earned = 0.0
@@ -73,7 +73,7 @@ def fly_last(
     loads, needs
         (K,) and (S, K), scratch.
     """
-    home, materials = arrays.level.shape[1], episodes.load.shape[2]
+    home, materials = arrays.need.shape[1], episodes.load.shape[2]
     flown, satisfaction, distance = episodes.flown[0, i], episodes.satisfaction[0], episodes.distance[0]
     for k in range(materials):
         loads[k] = episodes.load[0, i, k]

@@ -158,7 +158,7 @@ def _gaps(arrays: ProblemArrays, plan: Integers, one: int, flying: Integers, gap
 
     The place where a UAV is stands for a route without visits; two such routes are infinitely far apart.
     """
-    n = arrays.level.shape[1]
+    n = arrays.need.shape[1]
     for q in range(len(flying)):
         other, gap = flying[q], np.inf
         for s in range(plan.shape[0]):
@@ -188,7 +188,7 @@ def _leave(
     That is minus infinite where none of its UAVs may go, now or later: loads and ranges only shrink. Else it
     is infinite where one went in the plan, and elsewhere the most that one would earn there now.
     """
-    n = arrays.level.shape[1]
+    n = arrays.need.shape[1]
     reset_one(arrays, episodes, g)
     for s in range(plan.shape[0]):
         for i in range(plan.shape[1]):
@@ -226,7 +226,7 @@ def _insert(
 ) -> None:
     """Write the whole plans of groups' episodes (B, S, I), and last the one that has the best of them."""
     steps, m = plan.shape
-    n, home, groups = arrays.level.shape[1], targets.shape[1], len(uavs)
+    n, home, groups = arrays.need.shape[1], targets.shape[1], len(uavs)
     place, flown, routes = np.empty(m, np.int64), plans[-1], np.ascontiguousarray(plan.T)
     known = fly_routes(arrays, episodes, routes, place, flown)
     rewards, best = np.full(groups, -np.inf), np.empty(groups, np.int64)
