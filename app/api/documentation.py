@@ -17,10 +17,10 @@ from starlette.staticfiles import StaticFiles
 from app.api.access.guard import SCHEME, document, needed_role
 from app.api.batch_models import BatchLine
 from app.api.problem_details import ProblemDetails, responses
-from app.api.problem_models import largest
+from app.api.problem_models import largest, most_elements
 from app.api.security_headers import content_policy
 from app.api.wire_fields import wire_model
-from app.domain.fields import Amounts, Items, declared_fields
+from app.domain.fields import DeclaredField, Items, Named, declared_fields
 from app.domain.problem import Problem
 from app.settings import Settings
 
@@ -48,16 +48,24 @@ _INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 def _name_limits(components: dict[str, Any], settings: Settings) -> None:
     """Say in the schemas how large a problem may be here, which is the operator's to set."""
     for each in declared_fields(Problem):
-        if not isinstance(each.kind, Items):
-            continue
         for name in ("ProblemModel", "AllocationRequest"):
-            components[name]["properties"][each.name]["maxItems"] = largest(each.name, settings)
-        properties = components[wire_model(each.kind.of).__name__]["properties"]
-        for inner in declared_fields(each.kind.of):
-            if isinstance(inner.kind, Amounts):
-                # One that may be left open is a list or null.
-                amounts = properties[inner.name]
-                amounts.get("anyOf", [amounts])[0]["maxItems"] = settings.max_materials
+            _limit(components[name]["properties"][each.name], each, settings)
+        if isinstance(each.kind, Items | Named):
+            properties = components[wire_model(each.kind.of).__name__]["properties"]
+            for inner in declared_fields(each.kind.of):
+                _limit(properties[inner.name], inner, settings)
+
+
+def _limit(schema: dict[str, Any], field: DeclaredField, settings: Settings) -> None:
+    limit = (
+        largest(field.name, settings)
+        if isinstance(field.kind, Items)
+        else most_elements(field.kind, settings)
+    )
+    if limit is not None:
+        # One that may be left open is a list, or an object, or null.
+        kind = schema.get("anyOf", [schema])[0]
+        kind["maxProperties" if isinstance(field.kind, Named) else "maxItems"] = limit
 
 
 def operation_id(route: APIRoute) -> str:

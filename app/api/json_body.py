@@ -31,7 +31,13 @@ from app.api.errors import (
     UnsupportedContentEncoding,
     UnsupportedMediaType,
 )
-from app.api.json_structure import MOST_NAMES, NestedTooDeep, UnlikelyShape, require_likely_shape
+from app.api.json_structure import (
+    FEW_VALUES,
+    MOST_NAMES,
+    NestedTooDeep,
+    UnlikelyShape,
+    require_likely_shape,
+)
 from app.api.problem_details import FieldError, problem_response
 from app.settings import Settings
 
@@ -107,14 +113,29 @@ def read_body(body: bytes, validator: BodyValidator, settings: Settings) -> Base
     InvalidBody, AllocatorError, RequestError
         As :meth:`~app.api.body_validation.BodyValidator.validate` says.
     """
-    sizes = settings.max_uavs, settings.max_targets, settings.max_materials, settings.batch_limit
+    longest, most_values = longest_list(settings), 2 * settings.max_locations**2
     try:
-        require_likely_shape(body, max(sizes))
+        # Distances and durations of a profile are one object, with no other in it.
+        require_likely_shape(body, longest, max(FEW_VALUES, most_values))
     except NestedTooDeep as error:
         raise MalformedJson(error.reason) from None
     except UnlikelyShape as error:
         raise InvalidBody([FieldError(pointer=error.pointer, detail=error.reason)]) from None
     return validator.validate(parse_json(body), settings)
+
+
+def longest_list(settings: Settings) -> int:
+    """Return how many elements the longest list of any request may have."""
+    return max(
+        settings.max_uavs,
+        settings.max_targets,
+        settings.max_materials,
+        settings.max_no_fly_zones,
+        settings.max_zone_corners,
+        settings.max_locations,
+        settings.max_skills,
+        settings.batch_limit,
+    )
 
 
 def parse_json(body: bytes) -> Any:

@@ -17,7 +17,8 @@ BYTES_A_CONTAINER = 16
 """Fewer than any list or object of a request takes: the smallest area has two in 38 bytes."""
 
 DEEPEST = 32
-MOST_NAMES = 100
+MOST_NAMES = 700
+"""More than fit into the properties of an item, the largest object that a request can have."""
 _MOST_ESCAPES_A_TEXT = 1_000
 
 _TOKEN = re.compile(
@@ -67,7 +68,7 @@ def is_small(text: bytes) -> bool:
     )
 
 
-def require_likely_shape(text: bytes, longest_list: int) -> int:
+def require_likely_shape(text: bytes, longest_list: int, most_values: int = FEW_VALUES) -> int:
     """Refuse a JSON text that is shaped as no request is. Whether it is JSON at all is not looked at.
 
     Parameters
@@ -76,6 +77,8 @@ def require_likely_shape(text: bytes, longest_list: int) -> int:
         The body.
     longest_list
         Most elements of a list.
+    most_values
+        Most values that stand without an object among them: those of the largest table.
 
     Returns
     -------
@@ -129,8 +132,10 @@ def require_likely_shape(text: bytes, longest_list: int) -> int:
             path.pop()
         if first == _OBJECT:
             flat = 0
-        elif flat > FEW_VALUES:
-            raise UnlikelyShape(_pointer(path), f"more than {FEW_VALUES} values without an object among them")
+        elif flat > most_values:
+            raise UnlikelyShape(
+                _pointer(path), f"more than {most_values} values without an object among them"
+            )
     return tokens
 
 

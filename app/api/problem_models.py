@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from operator import attrgetter
 from typing import Any
 
 from app.api.wire_fields import WireModel, from_wire, wire_model
-from app.domain.errors import InvalidProblem, ProblemTooLarge, Violation
-from app.domain.fields import Items, declared_fields
+from app.domain.errors import InvalidProblem, ProblemTooLarge, Violation, escaped
+from app.domain.fields import Amounts, Items, Kind, Named, declared_fields
 from app.domain.problem import Problem
+from app.domain.text_fields import Words
+from app.domain.world_fields import Corners, Table
 from app.settings import Settings
 
 
@@ -26,8 +30,8 @@ class ProblemModel(wire_model(Problem), WireModel):  # type: ignore[misc]  # its
         """
         lists = {name: _items(body.get(name)) for name in _LISTS}
         first = lists["uavs"][0] if lists["uavs"] else None
-        carried = _items(first.get("loadlist")) if isinstance(first, Mapping) else []
-        _refuse_oversize(lists, len(carried), settings, at)
+        materials = len(_items(_field(first, "loadlist")))
+        _refuse([*_sizes(lists, materials, settings), *_sizes_of_tables(body, settings)], at)
 
 
 _LISTS = {each.name: each.kind for each in declared_fields(Problem) if isinstance(each.kind, Items)}
@@ -38,6 +42,24 @@ def largest(name: str, settings: Settings) -> int:
     """Return how many items a list of a problem may have here; the setting has the list's name."""
     limit: int = getattr(settings, f"max_{name}")
     return limit
+
+
+def most_elements(kind: Kind, settings: Settings) -> int | None:
+    """Return how many elements a field of an item may have here; None where that is not limited."""
+    match kind:
+        case Amounts():
+            return settings.max_materials
+        case Words(ids_of=None):
+            return settings.max_skills
+        case Words(ids_of=str(listed)):
+            return largest(listed, settings)
+        case Corners():
+            return settings.max_zone_corners
+        case Table():
+            return settings.max_locations
+        case Named():
+            return settings.max_profiles
+    return None
 
 
 def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
@@ -55,12 +77,13 @@ def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
     Raises
     ------
     ProblemTooLarge
-        If it has more UAVs, targets or materials than are taken.
+        If one of its lists has more items than are taken.
     InvalidProblem
         If it breaks a rule between fields. Pointers of both are into the request's body.
     """
     lists = {name: getattr(body, name) for name in _LISTS}
-    _refuse_oversize(lists, len(body.uavs[0].loadlist), settings, at)
+    sizes = _sizes(lists, len(body.uavs[0].loadlist), settings)
+    _refuse([*sizes, *_sizes_of_tables(body, settings), *_sizes_of_words(lists, settings)], at)
     try:
         problem: Problem = from_wire(body, Problem)
     except InvalidProblem as error:
@@ -68,22 +91,57 @@ def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
     return problem
 
 
-def _refuse_oversize(
-    lists: Mapping[str, Sequence[Any]], n_materials: int, settings: Settings, at: str
-) -> None:
-    sizes = [
-        (f"/{name}", kind.called, len(lists[name]), largest(name, settings)) for name, kind in _LISTS.items()
-    ]
+_Size = tuple[str, str, int, int | None]
+"""Of a list: JSON pointer, what it counts, how many there are, how many are taken; None: as many as are."""
+
+
+def _sizes(lists: Mapping[str, Sequence[Any]], n_materials: int, settings: Settings) -> Iterator[_Size]:
+    for name, kind in _LISTS.items():
+        yield f"/{name}", kind.called, len(lists[name]), largest(name, settings)
     # The first UAV says how many materials there are.
-    sizes.append(("/uavs/0/loadlist", "materials", n_materials, settings.max_materials))
+    yield "/uavs/0/loadlist", "materials", n_materials, settings.max_materials
+
+
+def _sizes_of_tables(problem: object, settings: Settings) -> Iterator[_Size]:
+    """Yield the sizes of what can be large in few items: a model's, or of a body not yet looked at."""
+    polygons = [_items(_field(zone, "polygon")) for zone in _items(_field(problem, "no_fly_zones"))]
+    corners = sum(map(len, polygons))
+    yield "/no_fly_zones", "corners of no-fly zones", corners, settings.max_zone_corners
+    matrices = _field(problem, "matrices")
+    if not isinstance(matrices, Mapping):
+        return
+    yield "/matrices", "profiles", len(matrices), settings.max_profiles
+    for name, matrix in islice(matrices.items(), settings.max_profiles):
+        for table in ("distance", "duration"):
+            rows = len(_items(_field(matrix, table)))
+            yield f"/matrices/{escaped(name)}/{table}", "rows", rows, settings.max_locations
+
+
+def _sizes_of_words(lists: Mapping[str, Sequence[Any]], settings: Settings) -> Iterator[_Size]:
+    for name, kind in _LISTS.items():
+        for each in declared_fields(kind.of):
+            if isinstance(each.kind, Words):
+                words = list(map(attrgetter(each.name), lists[name]))
+                longest = max(map(len, words), default=0)
+                index = next((at for at, some in enumerate(words) if len(some) == longest), 0)
+                what = "words" if each.kind.ids_of is None else "ids"
+                limit = most_elements(each.kind, settings)
+                yield f"/{name}/{index}/{each.name}", what, longest, limit
+
+
+def _refuse(sizes: Sequence[_Size], at: str) -> None:
     violations = [
         Violation(at + pointer, f"{size} {what}, at most {limit} are taken")
         for pointer, what, size, limit in sizes
-        if size > limit
+        if limit is not None and size > limit
     ]
     if violations:
         detail = "; ".join(violation.detail for violation in violations)
         raise ProblemTooLarge(detail, violations)
+
+
+def _field(of: object, name: str) -> object:
+    return of.get(name) if isinstance(of, Mapping) else getattr(of, name, None)
 
 
 def _items(value: object) -> list[Any]:

@@ -32,6 +32,7 @@ from app.domain.fields import (
 )
 from app.domain.geometry import distance, longitude_stretch
 from app.domain.matrices import Matrix, longest_leg
+from app.domain.problem_rules import broken_rules_between_fields
 from app.domain.text_fields import Name, Properties, Words
 from app.domain.units import DISTANCE, SPEED, TIME, X, Y
 from app.domain.world_fields import Corners, JointActions
@@ -354,9 +355,10 @@ class Problem:
                 object.__setattr__(self, each.name, without_tiny(getattr(self, each.name)))
 
     def broken_rules(self) -> Iterator[tuple[str, str]]:
-        """Yield that there are no materials; how many there are, the first UAV says."""
+        """Yield that there are no materials, whose number the first UAV says, and rules between fields."""
         if self.uavs and not self.uavs[0].loadlist:
             yield "/uavs/0/loadlist", "0 materials; at least 1 is needed"
+        yield from broken_rules_between_fields(self)
 
     @property
     def n_uavs(self) -> int:

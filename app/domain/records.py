@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from operator import attrgetter
+from itertools import repeat
+from operator import attrgetter, is_
 from typing import Any
 
 from app.domain.fields import Conversion, Items, Kind, Named, Part, declared_fields
@@ -139,11 +140,11 @@ def _recorded(items: Collection[Any], of: type) -> list[dict[str, Any]]:
     records = [dict(zip(names, values_of(item))) for item in items]  # noqa: B905 - as long as each other, and quicker
     for name, value_of, default in recording.others:
         values = list(map(value_of, items))
-        # Nearly always, and counted quicker than looked at one by one.
-        if values.count(default) == len(values):
+        # Nearly always, and looked at quicker than one by one.
+        if all(map(is_, values, repeat(default))):
             continue
         for record, value in zip(records, values, strict=True):
-            if value != default:
+            if value is not default and (default is None or value != default):
                 record[name] = value
     for name, convert in recording.to_record:
         for record in records:

@@ -23,11 +23,15 @@ from app.domain.fields import (
     Whole,
     declared_fields,
 )
-from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.matrices import Matrix
+from app.domain.problem import UAV, Material, NoFlyZone, Objective, Problem, Target, Wind
+from app.domain.world_fields import FEWEST_CORNERS, Corners, Table
 
 PAGE = Path(__file__).with_name("README.md")
 
-_DECLARED = {each.__name__: each for each in (UAV, Target, Problem, Objective)}
+_DECLARED: dict[str, type] = {
+    each.__name__: each for each in (UAV, Target, Problem, Objective, Material, NoFlyZone, Wind, Matrix)
+}
 _HEAD = ("field", "meaning", "unit", "limits", "default")
 _TABLE = re.compile(r"(?<=<!-- fields of )(\w+)( -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)
 
@@ -57,8 +61,10 @@ def _limits(field: DeclaredField) -> str:
             return ""
         below = "below " if isinstance(kind, Number) and kind.below else ""
         return f"from {kind.low:g}" if kind.high == MAX_MAGNITUDE else f"{kind.low:g} to {below}{kind.high:g}"
-    if isinstance(kind, Amounts):
+    if isinstance(kind, Amounts | Table):
         return "each from 0"
+    if isinstance(kind, Corners):
+        return f"at least {FEWEST_CORNERS} corners"
     if isinstance(kind, Items):
         return f"at least {kind.least}" if kind.least else ""
     return ""

@@ -16,16 +16,20 @@ import numpy.typing as npt
 
 from app.domain.geometry import EARTH_RADIUS_KM, distances, unrolled
 from app.domain.problem import TOLERANCE, Problem
+from app.domain.time_warnings import odd_times
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 CODES = (
     "all_returning",
+    "committed_beyond_steps",
     "coordinates_swapped",
     "deadline_passed",
     "degrees_on_plane",
+    "earliest_after_deadline",
     "far_point",
+    "never_available",
     "no_level",
     "none_in_range",
     "not_carried",
@@ -117,7 +121,11 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
         M UAVs, N targets; it takes some 20 ms where M is 1000 and N is 2000.
     """
     scene = _scene(problem)
-    found = [*_supplies(scene), *_times(scene), *_speeds_and_ranges(scene), *_levels(scene)]
+    times = [warning for code, places in odd_times(problem) for warning in _some(code, places)]
+    found = [*_supplies(scene), *times, *_speeds_and_ranges(scene), *_levels(scene)]
+    if problem.matrices is not None:
+        # Positions are for display alone.
+        return tuple(found)
     places = np.concatenate([scene.start, scene.current, scene.area])
     if (places == places[0]).all():
         if problem.n_targets > 1:
@@ -127,7 +135,9 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
     found += swapped or _far_points(scene, places)
     if problem.crs == "local":
         found += _degrees(scene, places)
-    if scene.ready.any() and scene.wanted.any() and not _anyone_in_range(scene):
+    # With a wind behind it a UAV gets farther than its range.
+    still = problem.wind is None or not problem.wind.speed
+    if still and scene.ready.any() and scene.wanted.any() and not _anyone_in_range(scene):
         says = "no UAV that can be sent has the range for any target that needs anything"
         found.append(ProblemWarning("/uavs", "none_in_range", says + _and_back(problem)))
     return tuple(found)
@@ -214,15 +224,6 @@ def _supplies(scene: _Scene) -> Iterator[ProblemWarning]:
         carrying = np.flatnonzero(scene.ready & (scene.load[:, k] > 0.0))
         says = f"material {k + 1} is carried by {len(carrying)} UAVs, and no target needs any"
         yield ProblemWarning(f"/uavs/{carrying[0]}/loadlist/{k}", "not_needed", says)
-
-
-def _times(scene: _Scene) -> Iterator[ProblemWarning]:
-    passed = [
-        (f"/targets/{j}/deadline", f"the deadline of {target.id!r} was {-target.deadline:g} time units ago")
-        for j, target in enumerate(scene.problem.targets)
-        if target.deadline is not None and target.deadline < 0.0 and scene.wanted[j]
-    ]
-    yield from _some("deadline_passed", passed)
 
 
 def _levels(scene: _Scene) -> Iterator[ProblemWarning]:

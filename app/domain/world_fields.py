@@ -75,8 +75,6 @@ class Table(Kind):
         if not isinstance(value, np.ndarray) or value.ndim != 2 or value.shape[0] != value.shape[1]:
             yield from _misshapen(pointer, value)
             return
-        if not len(value):
-            yield Violation(pointer, "0 rows; at least 1 is needed")
         wrong = ~((value >= low) & ((value <= high) | np.isposinf(value)))
         for row, column in np.argwhere(wrong).tolist():
             yield from out_of_limits(f"{pointer}/{row}/{column}", float(value[row, column]), low, high)
@@ -99,6 +97,8 @@ def table_of(rows: Any) -> Any:
         table = np.array(rows, dtype=np.float64)
     except (TypeError, ValueError):
         return rows
+    if table.ndim != 2 or not table.size:
+        return rows
     # A number that is missing is NaN by now.
     table[np.isnan(table)] = np.inf
     table[np.abs(table) < MIN_MAGNITUDE] = 0.0
@@ -108,8 +108,10 @@ def table_of(rows: Any) -> Any:
 
 def _misshapen(pointer: str, rows: Any) -> Iterator[Violation]:
     """Yield the rows that are not as long as there are rows, and entries that are no numbers."""
-    if not _is_sequence(rows):
-        yield Violation(pointer, "is no list of rows")
+    if not _is_sequence(rows) or not len(rows):
+        yield Violation(
+            pointer, "0 rows; at least 1 is needed" if _is_sequence(rows) else "is no list of rows"
+        )
         return
     for index, row in enumerate(rows):
         if not _is_sequence(row):

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import distances
+from app.domain.plane import Plane
 from app.travel.corner_ways import CornerWays, padded
 from app.travel.legs import Flown, Way
 from app.travel.obstacles import Corners, Obstacles
-from app.travel.plane import Plane
 from app.travel.sight import PAIRS_AT_ONCE, Sight, bends_around
 from app.travel.straight import STILL_AIR, flown_straight, straight_lengths, way_along
 from app.travel.wind import Wind

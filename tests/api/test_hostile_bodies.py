@@ -34,7 +34,7 @@ ROUTES = {
     "/library": Registration,
     "/library/similar": SimilarRequest,
 }
-LONGEST = max(SETTINGS.max_uavs, SETTINGS.max_targets, SETTINGS.max_materials, SETTINGS.batch_limit)
+LONGEST = json_body.longest_list(SETTINGS)
 
 
 def containers_of(value):

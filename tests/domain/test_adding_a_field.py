@@ -19,9 +19,9 @@ ADDED = {
     # The last line of a class, and what is declared after it.
     "requested: Annotated[": [
         'access: Annotated[float, Number(low=0.0, high=1.0), "How easily it is reached"] = 0.5',
-        'earliest: Annotated[float | None, Number(unit=TIME), "A visit begins no sooner"] = None',
+        'opens: Annotated[float | None, Number(unit=TIME), "A visit begins no sooner"] = None',
         'covered: Annotated[bool, Flag(), "Whether there is a roof"] = False',
-        'skills: Annotated[tuple[str, ...], text_fields.Words(), "What it takes to help there"] = ()',
+        'helps: Annotated[tuple[str, ...], text_fields.Words(), "What it takes to help there"] = ()',
         'called: Annotated[str | None, text_fields.Name(), "Its name for people"] = None',
         'kept: Annotated[dict[str, object] | None, text_fields.Properties(), "Of the client"] = None',
         'ground: Annotated[str, Choice(("sand", "rock")), "What it stands on"] = "rock"',
@@ -66,7 +66,7 @@ def refused(problem, **fields):
         return [[each.pointer, each.detail] for each in error.violations]
 
 plain = taken()
-full = taken(access=0.25, earliest=3, covered=True, ground="sand", full_load=[7.0], **json.loads(sys.argv[2]))
+full = taken(access=0.25, opens=3, covered=True, ground="sand", full_load=[7.0], **json.loads(sys.argv[2]))
 record = problem_to_record(full)
 stays = {"uav_id": full.uavs[0].id, "distance": 0.0, "return_distance": 0.0, "stops": []}
 plan = {"job_id": "1", "algorithm": "greedy", "reward": 0.0, "satisfaction": 0.0, "distance": 0.0,
@@ -75,7 +75,7 @@ older = problem_to_record(full)
 del older["targets"][0]["access"]
 print(json.dumps({
     "file": app.__file__,
-    "refused": [refused(plain, access=1.5), refused(plain, ground="ice"), refused(plain, earliest=1e13)],
+    "refused": [refused(plain, access=1.5), refused(plain, ground="ice"), refused(plain, opens=1e13)],
     "tiny": replace(plain, targets=(replace(plain.targets[0], access=1e-200),)).targets[0].access,
     "record": [record["targets"][0], record["uavs"][0]["full_load"], problem_from_record(record) == full],
     "default": [plain.targets[0].access, problem_from_record(older).targets[0].access],
@@ -83,7 +83,7 @@ print(json.dumps({
     "refused on the wire": [taken(access=1.5), taken(ground="ice"), taken(covered=1), taken(full_load=[])],
     "openapi": create_application(Settings(data_dir=pathlib.Path("data"))).openapi(),
     "texts": [
-        refused(full, skills=("a", "b\\n")), refused(full, called="\\t"),
+        refused(full, helps=("a", "b\\n")), refused(full, called="\\t"),
         refused(full, kept={"a": 5000 * "b"}),
     ],
     "exported": json.loads(geojson(flown_plan(full, plan)))["features"],
@@ -94,8 +94,8 @@ BODY = {
     "uavs": [{"x_s": 0, "y_s": 0, "speed": 1, "voyage": 9, "loadlist": [5.0]}],
     "targets": [{"x": 1, "y": 0, "level": 1, "loadlist": [2.0]}],
 }
-TEXTS = {"skills": ["medic", "=night, rain"], "called": "Kiliwa", "kept": {"ref": [1, {"a": None}]}}
-SET = {"access": 0.25, "earliest": 3, "covered": True, "ground": "sand", **TEXTS}
+TEXTS = {"helps": ["medic", "=night, rain"], "called": "Kiliwa", "kept": {"ref": [1, {"a": None}]}}
+SET = {"access": 0.25, "opens": 3, "covered": True, "ground": "sand", **TEXTS}
 
 
 @pytest.fixture(scope="module")
@@ -132,11 +132,11 @@ def test_the_domain_checks_it(found):
     assert found["refused"] == [
         [["/targets/0/access", "1.5 is not in 0..1"]],
         [["/targets/0/ground", "'ice' is neither 'sand' nor 'rock'"]],
-        [["/targets/0/earliest", "1e+13 is not in -1e+12..1e+12"]],
+        [["/targets/0/opens", "1e+13 is not in -1e+12..1e+12"]],
     ]
     assert found["tiny"] == 0.0
-    (skills,), (called,), (kept,) = found["texts"]
-    assert (skills[0], called[0]) == ("/targets/0/skills/1", "/targets/0/called")
+    (helps,), (called,), (kept,) = found["texts"]
+    assert (helps[0], called[0]) == ("/targets/0/helps/1", "/targets/0/called")
     assert kept == ["/targets/0/kept", "5008 bytes as JSON, at most 4096"]
 
 
@@ -169,7 +169,7 @@ def test_the_description_of_the_service_has_it(found):
         "title": "Access",
         "description": "How easily it is reached",
     }
-    assert properties["earliest"]["anyOf"][1] == {"type": "null"}
+    assert properties["opens"]["anyOf"][1] == {"type": "null"}
     assert properties["ground"]["enum"] == ["sand", "rock"]
     amounts, _null = schemas["UAVModel"]["properties"]["full_load"]["anyOf"]
     assert amounts["maxItems"] == schemas["UAVModel"]["properties"]["loadlist"]["maxItems"]
@@ -177,7 +177,7 @@ def test_the_description_of_the_service_has_it(found):
 
 def test_the_reference_has_it(found):
     assert "| `access` | How easily it is reached |  | 0 to 1 | `0.5` |" in found["reference"]
-    assert "| `earliest` | A visit begins no sooner | time units, or h |  | `null` |" in found["reference"]
+    assert "| `opens` | A visit begins no sooner | time units, or h |  | `null` |" in found["reference"]
 
 
 def test_the_plan_as_geojson_has_it(found):
@@ -228,6 +228,8 @@ LISTS = {"uavs", "targets"}
 )
 def test_the_page_names_no_field_it_need_not(file, needed):
     declared = {field.name for of in (UAV, Target, Objective, Problem) for field in declared_fields(of)}
+    # Words of the language, of JSON Schema and of GeoJSON.
+    declared -= {"name", "properties"}
     text = re.sub(r"/\*.*?\*/|//.*", "", (MODULES / file).read_text(encoding="utf-8"), flags=re.DOTALL)
     named = set(re.findall(r"(?<![\w/])[a-z_]+(?!\w)", text)) & declared
     assert named <= needed

@@ -11,7 +11,8 @@ from problems import on_earth, random_problem
 
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.geometry import distance
-from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.matrices import Matrix
+from app.domain.problem import UAV, Objective, Problem, Target, Wind
 from app.domain.warnings import CODES, problem_warnings
 from app.settings import Settings
 from app.simulation.generator import FAMILIES, generate
@@ -65,6 +66,21 @@ def in_plane(problem):
 
 TROUBLES = {
     "all_returning": (with_uavs(scene(), lambda u: {"ret": True}), "/uavs", "every UAV"),
+    "committed_beyond_steps": (
+        replace(with_uavs(scene(), lambda u: {"committed": ("area-2", "area-1")}, 1), max_steps=1),
+        "/uavs/1/committed",
+        "2 visits are promised of 'uav-2', in 1 steps",
+    ),
+    "earliest_after_deadline": (
+        with_targets(scene(), lambda t: {"deadline": 2.0, "earliest": 2.5}, 4),
+        "/targets/4/earliest",
+        "begins at 2.5 at the earliest, and its deadline, 2,",
+    ),
+    "never_available": (
+        with_uavs(scene(), lambda u: {"available_from": 3.0, "available_until": 2.0}, 1),
+        "/uavs/1/available_until",
+        "has to have landed at 2, before it may take off, at 3",
+    ),
     "deadline_passed": (
         with_targets(scene(), lambda t: {"deadline": -0.5}, 3),
         "/targets/3/deadline",
@@ -121,6 +137,23 @@ def test_a_warning_names_the_place_and_nothing_else_is_said(code):
     (warning,) = problem_warnings(problem)
     assert (warning.code, warning.pointer) == (code, pointer)
     assert said in warning.detail
+
+
+def test_with_a_wind_behind_it_a_uav_may_get_farther_than_its_range():
+    short = with_uavs(scene(), lambda u: {"voyage": 30.0})
+    assert codes(replace(short, wind=Wind(0.0, 90.0))) == ["none_in_range"]
+    assert codes(replace(short, wind=Wind(40.0, 90.0))) == []
+
+
+def test_positions_of_a_problem_with_matrices_are_for_display_alone():
+    problem = replace(
+        scene(),
+        uavs=tuple(replace(uav, location=0) for uav in scene().uavs),
+        targets=tuple(replace(target, location=1) for target in scene().targets),
+        matrices={"road": Matrix([[0.0, 99.0], [99.0, 0.0]])},
+    )
+    assert codes(with_targets(problem, swap, 2)) == []
+    assert codes(with_targets(with_targets(problem, swap, 2), lambda t: {"level": 0.0})) == ["no_level"]
 
 
 @pytest.mark.parametrize(

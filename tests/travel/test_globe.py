@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scenes import square, star_scene
 
 from app.domain.geometry import EARTH_RADIUS_KM
+from app.domain.plane import BeyondProjection
 from app.travel.choice import legs_between
 from app.travel.headings import heading
-from app.travel.plane import BeyondProjection
 
 
 def arc(a, b):

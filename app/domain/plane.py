@@ -25,7 +25,19 @@ _ROUNDING = 1e-9
 
 
 class BeyondProjection(ValueError):
-    """A place is too far from the middle of the bounding box for ways round zones."""
+    """A place is too far from the middle of the bounding box for ways round zones.
+
+    Parameters
+    ----------
+    detail
+        How far it is, and how far it may be.
+    index
+        Which of the points it is.
+    """
+
+    def __init__(self, detail: str, index: int) -> None:
+        super().__init__(detail)
+        self.index = index
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +114,8 @@ class Plane:
         if farthest > WIDEST + _ROUNDING:
             raise BeyondProjection(
                 f"a place is {farthest:.3f} degrees from the middle of the bounding box "
-                f"({x_0:.6g}, {y_0:.6g}); with zones all lie within {WIDEST:g} degrees"
+                f"({x_0:.6g}, {y_0:.6g}); with zones all lie within {WIDEST:g} degrees",
+                int(up.argmin()),
             )
         right = cosine * np.sin(east)
         ahead = np.sin(np.radians(points[:, 1] - y_0)) + math.sin(latitude_0) * cosine * bulge
