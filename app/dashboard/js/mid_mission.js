@@ -118,7 +118,7 @@ export function uavAt(problem, answer, i, time) {
 /**
  * The mission at a moment as a problem.
  *
- * Material counts as unloaded on arrival. Deadlines are counted from the moment on. The distance weight is the
+ * Material counts as unloaded on arrival. All times are counted from the moment on. The distance weight is the
  * one that the plan was found with, so that rewards before and after can be compared.
  *
  * @param {object} problem what was allocated
@@ -138,8 +138,12 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
     }
     if (lost.has(uavId(uav, i))) return;
     const ret = now.returning && (uav.ret || !recall) ? 1 : 0;
+    const visited = new Set(answer.routes[i].stops.slice(0, now.done).map((stop) => stop.target_id));
     uavs.push({
       ...uav, id: uavId(uav, i), x_c: now.place[0], y_c: now.place[1], dis: now.flown, ret, loadlist: load,
+      ...(uav.committed ? { committed: uav.committed.filter((id) => !visited.has(id)) } : {}),
+      ...(uav.available_from ? { available_from: Math.max(0, uav.available_from - time) } : {}),
+      ...(uav.available_until == null ? {} : { available_until: uav.available_until - time }),
     });
   });
   const targets = problem.targets.map((target, j) => {
@@ -151,12 +155,13 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
       // What an area asked for at first stays the measure of what it has.
       ...(served ? { requested: requestedBy(target) } : {}),
       ...(target.deadline == null ? {} : { deadline: target.deadline - time }),
+      ...(target.earliest ? { earliest: Math.max(0, target.earliest - time) } : {}),
     };
   });
-  return {
-    ...problem, uavs, targets,
-    objective: { ...problem.objective, distance_weight: answer.distance_weight },
-  };
+  // The plan to begin from was one of the whole mission, and so is what its changes cost.
+  const { start_plan: _plan, ...rest } = problem;
+  const { change_weight: _weight, ...objective } = rest.objective ?? {};
+  return { ...rest, uavs, targets, objective: { ...objective, distance_weight: answer.distance_weight } };
 }
 
 /** An area with other needs than were left: it asked for as much more or less at first. */
