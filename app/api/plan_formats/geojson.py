@@ -1,33 +1,32 @@
-"""The whole plan as GeoJSON (RFC 7946): starting points, areas, and a line a route."""
+"""The whole plan as GeoJSON (RFC 7946): starting points, areas, a line a route, and zones."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping
 from typing import Any
 
+from app.api.plan_formats.antimeridian import closed, cut_line, cut_ring
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
 from app.domain.fields import declared_fields
-from app.domain.problem import UAV, Target
+from app.domain.problem import UAV, NoFlyZone, Target
 from app.domain.records import item_to_record
-
-Point = tuple[float, float]
 
 MEDIA_TYPE = "application/geo+json"
 
 
 def geojson(plan: FlownPlan) -> str:
-    """Write a feature collection: a Point a UAV and an area, a LineString a UAV that flies.
+    """Write a feature collection: a Point a UAV and an area, a LineString a UAV that flies, a Polygon a zone.
 
     The positions of a ``local`` problem are no longitudes and latitudes, which RFC 7946 has only by prior
-    arrangement: the member ``coordinates`` says which they are. A line that crosses the antimeridian is cut
-    there into a MultiLineString (section 3.1.9).
+    arrangement: the member ``coordinates`` says which they are. What crosses the antimeridian is cut there
+    (section 3.1.9).
     """
     geographic = plan.problem.crs == "wgs84"
     features = [_start(route) for route in plan.routes]
     features += _areas(plan)
     features += [_line(route, geographic=geographic) for route in plan.flying]
+    features += [_zone(zone, geographic=geographic) for zone in plan.problem.no_fly_zones]
     content = {
         "type": "FeatureCollection",
         "coordinates_are": "longitude and latitude in degrees (WGS 84)" if geographic else "x and y, local",
@@ -75,7 +74,20 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
     return features
 
 
-def _fields(item: UAV | Target, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _zone(zone: NoFlyZone, *, geographic: bool) -> dict[str, Any]:
+    rings = cut_ring(zone.polygon) if geographic else [list(zone.polygon)]
+    polygons = [[[list(point) for point in closed(ring)]] for ring in rings]
+    several = len(polygons) > 1
+    properties = _fields(zone, {"id": {"zone_id": zone.id}, "polygon": {}})
+    return _feature(
+        "zone",
+        "MultiPolygon" if several else "Polygon",
+        polygons if several else polygons[0],
+        **properties,
+    )
+
+
+def _fields(item: UAV | Target | NoFlyZone, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the fields of an item by their names, but for those in whose place something else is said."""
     of: type = type(item)
     record = item_to_record(item)
@@ -93,7 +105,7 @@ def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
     places = [(uav.x_c, uav.y_c), *((stop.target.x, stop.target.y) for stop in route.stops)]
     if route.return_distance > 0:
         places.append((uav.x_s, uav.y_s))
-    lines = _cut(places) if geographic else [places]
+    lines = cut_line(places) if geographic else [places]
     several = len(lines) > 1
     coordinates = [[list(point) for point in line] for line in lines]
     return _feature(
@@ -117,20 +129,6 @@ def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
             for stop in route.stops
         ],
     )
-
-
-def _cut(places: Sequence[Point]) -> list[list[Point]]:
-    """Cut a line where it crosses the antimeridian; every leg takes the shorter way round."""
-    lines = [[places[0]]]
-    for (x_a, y_a), (x_b, y_b) in pairwise(places):
-        if abs(x_b - x_a) > 180.0:
-            edge = 180.0 if x_a > 0 else -180.0
-            there = x_b + 2 * edge
-            y = y_a if there == x_a else y_a + (y_b - y_a) * (edge - x_a) / (there - x_a)
-            lines[-1].append((edge, y))
-            lines.append([(-edge, y)])
-        lines[-1].append((x_b, y_b))
-    return lines
 
 
 def _feature(kind: str, geometry: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
