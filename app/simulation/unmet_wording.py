@@ -79,8 +79,8 @@ class Wording:
         """It opens too late to wait for."""
         opens = self._problem.targets[j].earliest
         return (
-            f"it opens at {opens:.6g}: {self._uav(i)} would wait {needs.waiting:.6g} in the air, where it would "
-            f"be for {needs.aloft:.6g} in all, and has {self._usable(i):.6g}"
+            f"it opens at {opens:.6g}: {self._uav(i)} would be in the air for {needs.aloft:.6g}, "
+            f"{needs.waiting:.6g} of it waiting, and has {self._usable(i):.6g}"
         )
 
     def available_until(self, i: int, landing: float) -> str:

@@ -258,7 +258,7 @@ def left_of(amount: float, taken: float, whole: float) -> float:
 
 @inlined
 def earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
-    """Satisfaction that an amount unloaded at a target brings (rule 5), were all of it beyond the first share.
+    """Satisfaction that an amount unloaded at a target brings (rule 5), all of it beyond the first share.
 
     Its need is not nothing. To it comes :func:`bonus_of`, material by material, and time takes some of both
     (:func:`discount`).

@@ -33,9 +33,9 @@ def windy(problem):
     )
 
 
-@pytest.mark.parametrize("name", ["problem", "windy"])
-def test_fields_have_the_axes_that_are_declared(name, request):
-    given = request.getfixturevalue(name)
+@pytest.mark.parametrize("which", ["problem", "windy"])
+def test_fields_have_the_axes_that_are_declared(which, request):
+    given = request.getfixturevalue(which)
     arrays = compile_problem(given)
     sizes = {**SIZES, "C": len({uav.speed for uav in given.uavs}) if given.wind else 1}
     for name, axes in AXES.items():
@@ -47,9 +47,9 @@ def test_fields_have_the_axes_that_are_declared(name, request):
         assert shape[1 : 1 + len(declared)] == declared or not getattr(arrays, name).size, name
 
 
-@pytest.mark.parametrize("name", ["problem", "windy"])
-def test_a_part_is_what_its_own_problem_compiles_to(name, request):
-    problem = request.getfixturevalue(name)
+@pytest.mark.parametrize("which", ["problem", "windy"])
+def test_a_part_is_what_its_own_problem_compiles_to(which, request):
+    problem = request.getfixturevalue(which)
     uavs, targets = [2, 0], [4, 1, 3]
     smaller = replace(
         problem,

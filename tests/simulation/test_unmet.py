@@ -83,10 +83,15 @@ def test_one_more_load_would_do():
 
 
 FIRST_EDITION = {
-    UnmetCode(code)
-    for code in (
-        "no_supply out_of_range deadline step_limit range_used time_used loads_used not_worth_it not_chosen"
-    ).split()
+    UnmetCode.NO_SUPPLY,
+    UnmetCode.OUT_OF_RANGE,
+    UnmetCode.DEADLINE,
+    UnmetCode.STEP_LIMIT,
+    UnmetCode.RANGE_USED,
+    UnmetCode.TIME_USED,
+    UnmetCode.LOADS_USED,
+    UnmetCode.NOT_WORTH_IT,
+    UnmetCode.NOT_CHOSEN,
 }
 """Reasons of problems without waiting, zones, wind, skills and other limits."""
 
