@@ -97,8 +97,8 @@ def require_sizes(model: type[BaseModel], body: Mapping[str, Any], settings: Set
     require = getattr(model, "require_sizes", None)
     if require is not None:
         require(body, settings, at)
-    for name, (inner, is_list) in _models_in(model).items():
-        if not is_list and isinstance(body.get(name), Mapping):
+    for name, (inner, holder) in _models_in(model).items():
+        if holder is None and isinstance(body.get(name), Mapping):
             require_sizes(inner, body[name], settings, f"{at}/{name}")
 
 
@@ -107,13 +107,20 @@ def _validate(model: type[BaseModel], given: Any, at: str, found: _Found) -> Bas
     wrong: set[str] = set()
     if isinstance(given, dict):
         given = dict(given)
-        for name, (inner, is_list) in _models_in(model).items():
+        for name, (inner, holder) in _models_in(model).items():
             value = given.get(name)
-            if is_list and isinstance(value, list):
+            if holder is list and isinstance(value, list):
                 given[name] = _validate_items(inner, value, f"{at}/{name}", found)
                 if any(each is None for each in given[name]):
                     wrong.add(name)
-            elif not is_list and isinstance(value, dict):
+            elif holder is dict and isinstance(value, dict):
+                given[name] = {
+                    key: _validate(inner, each, f"{at}/{name}/{escaped(key)}", found)
+                    for key, each in value.items()
+                }
+                if any(each is None for each in given[name].values()):
+                    wrong.add(name)
+            elif holder is None and isinstance(value, dict):
                 given[name] = _validate(inner, value, f"{at}/{name}", found)
                 if given[name] is None:
                     wrong.add(name)
@@ -148,22 +155,23 @@ def _at_once(model: type[BaseModel]) -> TypeAdapter[list[BaseModel]]:
 
 
 @cache
-def _models_in(model: type[BaseModel]) -> dict[str, tuple[type[BaseModel], bool]]:
-    """Return the fields that are models or lists of them, and whether they are lists."""
+def _models_in(model: type[BaseModel]) -> dict[str, tuple[type[BaseModel], type | None]]:
+    """Return the fields that are models, and what holds several of them: a list, or an object by names."""
     inside = {}
     for name, declared in model.model_fields.items():
         for kind in _alternatives(declared.annotation):
-            is_list = get_origin(kind) is list
-            inner = get_args(kind)[0] if is_list else kind
+            holder = next((each for each in (list, dict) if get_origin(kind) is each), None)
+            inner = kind if holder is None else get_args(kind)[-1]
             if isinstance(inner, type) and issubclass(inner, BaseModel):
-                inside[name] = inner, is_list
+                inside[name] = inner, holder
     return inside
 
 
 def _alternatives(annotation: Any) -> list[Any]:
-    if get_origin(annotation) in (Union, UnionType):
-        return [each for each in get_args(annotation) if each is not NoneType]
-    return [annotation]
+    """Return the types that a value may have, but for null, without their limits."""
+    several = get_origin(annotation) in (Union, UnionType)
+    given = [each for each in get_args(annotation) if each is not NoneType] if several else [annotation]
+    return [get_args(each)[0] if get_origin(each) is Annotated else each for each in given]
 
 
 def _model_for(declared: Any, body: Any) -> type[BaseModel]:

@@ -33,6 +33,10 @@ Identifier = Annotated[
     # The domain checks the pattern, and names the character that breaks it.
     Field(min_length=1, max_length=MAX_ID_LENGTH, json_schema_extra={"pattern": ID_PATTERN}),
 ]
+_NAMES: dict[str, Any] = {
+    "propertyNames": {"minLength": 1, "maxLength": MAX_ID_LENGTH, "pattern": ID_PATTERN}
+}
+"""What the names of an object may be, in the description; the domain checks them too."""
 
 
 class WireModel(BaseModel):
@@ -96,7 +100,7 @@ def _type_of(kind: Kind) -> Any:
         case world_fields.Table():
             return _list_of(_list_of(Annotated[float, Field(ge=0, le=MAX_MAGNITUDE)] | None), 1)
         case fields.Named(of=of):
-            return Annotated[dict[Identifier, wire_model(of)], Field(min_length=1)]  # type: ignore[misc]  # made here
+            return _by_name(wire_model(of))
         case fields.Items(of=of, least=least):
             return Annotated[list[wire_model(of)], Field(min_length=least)]  # type: ignore[misc]  # made here
         case fields.Part(of=of):
@@ -108,6 +112,10 @@ def _list_of(item: Any, least: int = 0, most: int | None = None) -> Any:
     """Return the type of a list that may be long: it is checked up to the first fault."""
     limits = Field(min_length=least or None, max_length=most, fail_fast=True)
     return Annotated[list[item], limits]
+
+
+def _by_name(item: Any) -> Any:
+    return Annotated[dict[str, item], Field(min_length=1, json_schema_extra=_NAMES)]
 
 
 def _whole(low: int, high: int) -> Any:

@@ -101,6 +101,8 @@ def test_what_is_null_or_empty_is_not_there():
         ),
         ({"matrices": {}}, "/matrices", "at least 1"),
         ({"matrices": {"r": {}}}, "/matrices/r/distance", "is missing"),
+        ({"matrices": {"a/b": {**LEGS, "time": []}}}, "/matrices/a~1b/time", "there are distance, duration"),
+        ({"matrices": {"r": 5}}, "/matrices/r", "needs an object"),
         (
             {"matrices": {"r": {"distance": [[0, -1]]}}},
             "/matrices/r/distance/0/1",

@@ -20,6 +20,8 @@ from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
 
 sys.path.append(str(Path(__file__).parents[2]))
 
+from world_rules import breaks_rules_of_the_world, has_too_many_corners
+
 from app.domain.errors import InvalidParameters
 from app.domain.identifiers import fault_of
 from app.solvers.registry import parse_parameters
@@ -34,7 +36,7 @@ _keys_sent: set[str] = set()
 
 
 def breaks_rules(problem):
-    """Say whether a problem breaks a rule between fields: materials, ids, degrees on the globe."""
+    """Say whether a problem breaks a rule between fields: materials, ids, degrees on the globe, the world."""
     groups = problem["uavs"], problem["targets"]
     if len({len(each["loadlist"]) for group in groups for each in group}) > 1:
         return True
@@ -49,6 +51,8 @@ def breaks_rules(problem):
         ids = [each.get("id") or f"{default}{number}" for number, each in enumerate(group, 1)]
         if len(set(ids)) < len(ids) or any(fault_of(each) is not None for each in ids):
             return True
+    if breaks_rules_of_the_world(problem):
+        return True
     points = [
         (each[x], each[y])
         for group in groups
@@ -89,7 +93,8 @@ def breaks_rule_beyond_schemas(case, kind):
     if kind == "invalid-parameters":
         return asked is not None and has_wrong_parameters(asked, default)
     if kind == "problem-too-large":
-        return asked is not None and asked.get("algorithm", default) in LIMITED_BY_SIZE
+        limited = asked is not None and asked.get("algorithm", default) in LIMITED_BY_SIZE
+        return limited or (problem is not None and has_too_many_corners(problem))
     if kind == "invalid-checkpoint":
         return "checkpoint" in body and is_no_checkpoint(body["checkpoint"])
     if kind == "idempotency-key-reused":
