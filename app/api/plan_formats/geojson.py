@@ -1,4 +1,4 @@
-"""The whole plan as GeoJSON (RFC 7946): starting points, areas, and a line a route."""
+"""The whole plan as GeoJSON (RFC 7946): starting points, areas, no-fly zones, and a line a route."""
 
 from __future__ import annotations
 
@@ -7,27 +7,32 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+import numpy as np
+
+from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
 from app.domain.fields import declared_fields
-from app.domain.problem import UAV, Target
+from app.domain.geometry import unrolled
+from app.domain.problem import UAV, NoFlyZone, Target
 from app.domain.records import item_to_record
 
 Point = tuple[float, float]
 
 MEDIA_TYPE = "application/geo+json"
+LARGEST_LONGITUDE = 180.0
 
 
 def geojson(plan: FlownPlan) -> str:
-    """Write a feature collection: a Point a UAV and an area, a LineString a UAV that flies.
+    """Write a feature collection: a Point a UAV and an area, a Polygon a zone, a LineString a UAV that flies.
 
     The positions of a ``local`` problem are no longitudes and latitudes, which RFC 7946 has only by prior
     arrangement: the member ``coordinates`` says which they are. A line that crosses the antimeridian is cut
-    there into a MultiLineString (section 3.1.9).
+    there into a MultiLineString (section 3.1.9), and a zone into a MultiPolygon.
     """
     geographic = plan.problem.crs == "wgs84"
     features = [_start(route) for route in plan.routes]
     features += _areas(plan)
-    features += [_line(route, geographic=geographic) for route in plan.flying]
+    features += [_zone(zone, geographic=geographic) for zone in plan.problem.no_fly_zones]
+    features += [_line(plan, route, geographic=geographic) for route in plan.flying]
     content = {
         "type": "FeatureCollection",
         "coordinates_are": "longitude and latitude in degrees (WGS 84)" if geographic else "x and y, local",
@@ -38,6 +43,7 @@ def geojson(plan: FlownPlan) -> str:
             "satisfaction": plan.satisfaction,
             "distance": plan.distance,
         },
+        **({"wind": item_to_record(plan.problem.wind)} if plan.problem.wind is not None else {}),
         "features": features,
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -75,7 +81,7 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
     return features
 
 
-def _fields(item: UAV | Target, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _fields(item: UAV | Target | NoFlyZone, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the fields of an item by their names, but for those in whose place something else is said."""
     of: type = type(item)
     record = item_to_record(item)
@@ -88,11 +94,13 @@ def _fields(item: UAV | Target, instead: Mapping[str, Mapping[str, Any]]) -> dic
     return properties
 
 
-def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
+def _line(plan: FlownPlan, route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
     uav = route.uav
-    places = [(uav.x_c, uav.y_c), *((stop.target.x, stop.target.y) for stop in route.stops)]
+    places = [(uav.x_c, uav.y_c)]
+    for stop in route.stops:
+        places += stop.path[1:]
     if route.return_distance > 0:
-        places.append((uav.x_s, uav.y_s))
+        places += route.return_path[1:]
     lines = _cut(places) if geographic else [places]
     several = len(lines) > 1
     coordinates = [[list(point) for point in line] for line in lines]
@@ -105,11 +113,13 @@ def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
         return_distance=route.return_distance,
         range_left=route.range_left,
         return_time=route.return_time,
+        **({"waits_on_ground": route.waiting_on_ground} if plan.in_world else {}),
         stops=[
             {
                 "target_id": stop.target.id,
                 "step": stop.step,
                 "arrival_time": stop.arrival_time,
+                **(_times(stop) if plan.in_world else {}),
                 "distance": stop.distance,
                 "delivered": list(stop.delivered),
                 "range_left": stop.range_left,
@@ -117,6 +127,54 @@ def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
             for stop in route.stops
         ],
     )
+
+
+def _times(stop: FlownStop) -> dict[str, float | None]:
+    return {
+        "begin_time": stop.begin_time,
+        "departure_time": stop.departure_time,
+        "endurance_left": stop.endurance_left,
+    }
+
+
+def _zone(zone: NoFlyZone, *, geographic: bool) -> dict[str, Any]:
+    properties = _fields(zone, {"id": {"zone_id": zone.id}, "polygon": {}})
+    rings = _halves(zone.polygon) if geographic else [list(zone.polygon)]
+    polygons = [[_ring(each)] for each in rings]
+    if len(polygons) == 1:
+        return _feature("no_fly_zone", "Polygon", polygons[0], **properties)
+    return _feature("no_fly_zone", "MultiPolygon", polygons, **properties)
+
+
+def _ring(corners: Sequence[Point]) -> list[list[float]]:
+    """Close a ring, counter-clockwise (section 3.1.6)."""
+    closed = [*corners, corners[0]]
+    area = sum(x_a * y_b - x_b * y_a for (x_a, y_a), (x_b, y_b) in pairwise(closed))
+    return [list(point) for point in (closed if area >= 0 else reversed(closed))]
+
+
+def _halves(corners: Sequence[Point]) -> list[list[Point]]:
+    """Cut a polygon where it crosses the antimeridian, into what lies west of it and what lies east of it."""
+    xs = unrolled("wgs84", np.array([x for x, _ in corners])).tolist()
+    if max(xs) <= LARGEST_LONGITUDE:
+        return [list(corners)]
+    ring = list(zip(xs, (y for _, y in corners), strict=True))
+    west, east = _side(ring, -1.0), _side(ring, 1.0)
+    moved = [(x - 360.0, y) for x, y in east]
+    # One that only touches the antimeridian has nothing beyond it.
+    return [part for part in (west, moved) if len({x for x, _ in part}) > 1]
+
+
+def _side(ring: Sequence[Point], sign: float) -> list[Point]:
+    """Return what of a polygon lies at longitudes of at least 180 degrees (sign 1), or at most (-1)."""
+    kept: list[Point] = []
+    for (x_a, y_a), (x_b, y_b) in pairwise([*ring, ring[0]]):
+        a, b = (sign * (x - LARGEST_LONGITUDE) for x in (x_a, x_b))
+        if a >= 0:
+            kept.append((x_a, y_a))
+        if a * b < 0:
+            kept.append((LARGEST_LONGITUDE, y_a + (y_b - y_a) * a / (a - b)))
+    return kept
 
 
 def _cut(places: Sequence[Point]) -> list[list[Point]]:
