@@ -85,8 +85,8 @@ def _type_of(kind: Kind) -> Any:
             return Literal[options]
         case fields.Identifier() | text_fields.Name():
             return Identifier
-        case text_fields.Words():
-            return list[Identifier]
+        case text_fields.Words(ids_of=of):
+            return Annotated[list[Identifier], Field(json_schema_extra={"idsOf": of} if of else None)]
         case text_fields.Properties():
             return dict[str, Any]
         case world_fields.Corners():

@@ -5,11 +5,13 @@ import io
 import json
 import math
 import zipfile
+from dataclasses import replace
 
 import pytest
 from pymavlink import mavwp
 
 from app.api.openapi_examples import example_problem
+from app.api.plan_formats.antimeridian import closed, cut_ring
 from app.api.plan_formats.csv_table import csv_table
 from app.api.plan_formats.errors import OutOfRange
 from app.api.plan_formats.flown_plan import flown_plan
@@ -17,7 +19,7 @@ from app.api.plan_formats.geojson import geojson
 from app.api.plan_formats.mission import Delivery, Ending, FlightChoices
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
-from app.domain.problem import UAV, Problem, Target
+from app.domain.problem import UAV, NoFlyZone, Problem, Target
 
 WAYPOINT, RETURN, LAND, TAKEOFF, DELAY, PLACE, SPEED, SERVO, GRIPPER = 16, 20, 21, 22, 93, 94, 178, 183, 211
 
@@ -230,6 +232,42 @@ def test_geojson_has_the_whole_plan():
     }
     assert [stop["delivered"] for stop in line["properties"]["stops"]] == [[3.0, 4.0], [7.0, 0.0]]
     assert by_kind["area"][1]["properties"]["remaining"] == [2.0, 0.0]
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_geojson_has_the_zones_closed_and_counter_clockwise(turned):
+    plan = two_visits(crs="local")
+    corners = ((34.1, -18.9), (34.2, -18.9), (34.2, -18.8))
+    zone = NoFlyZone("z", corners[::turned], "Airport", {"k": 1})
+    plan = replace(plan, problem=replace(plan.problem, no_fly_zones=(zone,)))
+    (feature,) = (f for f in json.loads(geojson(plan))["features"] if f["properties"]["kind"] == "zone")
+    assert feature["properties"] == {
+        "kind": "zone",
+        "zone_id": "z",
+        "name": "Airport",
+        "properties": {"k": 1},
+    }
+    ((*ring, last),) = feature["geometry"]["coordinates"]
+    assert last == ring[0]
+    start = ring.index(list(corners[0]))
+    assert [*ring[start:], *ring[:start]] == [list(corner) for corner in corners]
+
+
+@pytest.mark.parametrize("first", range(4))
+def test_a_zone_across_the_antimeridian_is_two_polygons(first):
+    corners = [(179.0, 0.0), (-179.0, 0.0), (-179.0, 2.0), (179.0, 1.0)]
+    west, east = cut_ring([*corners[first:], *corners[:first]])
+    found = {frozenset(closed(ring)): closed(ring) for ring in (west, east)}
+    assert set(found) == {
+        frozenset([(179.0, 0.0), (180.0, 0.0), (180.0, 1.5), (179.0, 1.0)]),
+        frozenset([(-180.0, 0.0), (-179.0, 0.0), (-179.0, 2.0), (-180.0, 1.5)]),
+    }
+    around_the_pole, elsewhere = (
+        [(-10.0, 80.0), (110.0, 80.0), (-130.0, 80.0)],
+        [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)],
+    )
+    assert cut_ring(around_the_pole) == [around_the_pole]
+    assert cut_ring(elsewhere) == [elsewhere]
 
 
 def test_geojson_cuts_lines_at_the_antimeridian():

@@ -145,9 +145,9 @@ def test_csv_has_times_and_ways():
 def test_geojson_has_ways_times_and_zones():
     plan, answer = flown()
     features = json.loads(geojson(plan))["features"]
-    (zone,) = [each for each in features if each["properties"]["kind"] == "no_fly_zone"]
+    (zone,) = [each for each in features if each["properties"]["kind"] == "zone"]
     assert zone["geometry"]["coordinates"] == [[list(corner) for corner in (*CORNERS, CORNERS[0])]]
-    assert zone["properties"] == {"kind": "no_fly_zone", "zone_id": "airport", "name": "Airport"}
+    assert zone["properties"] == {"kind": "zone", "zone_id": "airport", "name": "Airport"}
     (line,) = [each for each in features if each["properties"]["kind"] == "route"]
     route = answer["routes"][0]
     (first, second) = route["stops"]
@@ -171,7 +171,7 @@ def test_a_zone_across_the_antimeridian_is_cut_in_two_and_is_as_large():
         no_fly_zones=(NoFlyZone("z", corners[::-1]),),
     )
     features = json.loads(geojson(flown(problem)[0]))["features"]
-    (zone,) = [each for each in features if each["properties"]["kind"] == "no_fly_zone"]
+    (zone,) = [each for each in features if each["properties"]["kind"] == "zone"]
     assert zone["geometry"]["type"] == "MultiPolygon"
     areas = []
     for ((*ring,),) in zone["geometry"]["coordinates"]:

@@ -113,10 +113,10 @@ class Maker:
         return self.random.uniform(0, 90)
 
     def value(self, schema, identifier=False):
-        if "$ref" in schema:
-            schema = self.components[schema["$ref"].rsplit("/", 1)[1]]
         if "anyOf" in schema:
             schema = next(each for each in schema["anyOf"] if each.get("type") != "null")
+        if "$ref" in schema:
+            schema = self.components[schema["$ref"].rsplit("/", 1)[1]]
         if "enum" in schema:
             return self.random.choice(schema["enum"])
         match schema.get("type"):
@@ -136,7 +136,7 @@ class Maker:
                 return {
                     name: self.value(each)
                     for name, each in schema.get("properties", {}).items()
-                    if self.random.random() < 0.7
+                    if name in schema.get("required", []) or self.random.random() < 0.7
                 }
         raise AssertionError(f"no value is known for {schema}")
 
@@ -462,7 +462,7 @@ def test_features_are_read_as_they_are_found(read):
         (collection(feature(point("1", "2"))), 'feature 1 has coordinates that are no numbers: ["1","2"]'),
         (
             collection(feature(point(1, 2), properties={"kind": "school"}, id="a")),
-            "feature 1 (a) has no property `kind` that is uav or area",
+            "feature 1 (a) has no property `kind` that is uav, area or zone",
         ),
         (
             collection(feature(point(1, 2), properties={"level": "high"}, id="a")),

@@ -47,7 +47,9 @@ def put(arrays, pool, i, targets):
     """Offer a route to a pool."""
     flown, at = [0.0], None
     for j in targets:
-        flown.append(flown[-1] + (arrays.start_target[0, i, j] if at is None else arrays.between[0, at, j]))
+        flown.append(
+            flown[-1] + (arrays.start_target[0, i, j] if at is None else arrays.between[0, 0, at, j])
+        )
         at = j
     collect(arrays, pool, i, np.array(targets), len(targets), np.array(flown) + arrays.uavs["dis"][0, i])
 
@@ -73,7 +75,7 @@ def test_of_the_orders_of_a_set_the_shortest_is_kept_for_each_kind():
             put(arrays, pool, i, targets)
     kept = routes_of(pool)
     assert sorted(uav for uav, _, _ in kept) == [0, 1]
-    legs = arrays.start_target[0, 0], arrays.between[0]
+    legs = arrays.start_target[0, 0], arrays.between[0, 0]
     lengths = [
         legs[0][a] + legs[1][a, b] + legs[1][b, c] for a, b, c in ([0, 1, 2], [1, 0, 2], [2, 1, 0], [0, 2, 1])
     ]

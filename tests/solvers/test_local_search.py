@@ -20,7 +20,7 @@ from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
 from app.solvers.local_search.ceiling import most_satisfaction
-from app.solvers.local_search.change import apply, extra_distance, feasible, undo
+from app.solvers.local_search.change import apply, extra_closing, extra_distance, feasible, undo
 from app.solvers.local_search.effort import default_moves, default_restarts
 from app.solvers.local_search.improvement import Cooling, improve
 from app.solvers.local_search.moves import draw_move
@@ -84,7 +84,8 @@ def test_totals_stay_those_of_the_simulator_through_random_moves():
             if not feasible(search.arrays, search.change):
                 continue
             extra = extra_distance(search.arrays, search.routes, search.change)
-            apply(search.arrays, search.routes, search.change, extra)
+            closing = extra_closing(search.arrays, search.routes, search.change)
+            apply(search.arrays, search.routes, search.change, extra, closing)
             applied += 1
             if rng.random() < 0.4:
                 undo(search.routes, search.change)
@@ -110,6 +111,7 @@ def test_undoing_leaves_no_trace():
                 search.routes,
                 search.change,
                 extra_distance(search.arrays, search.routes, search.change),
+                extra_closing(search.arrays, search.routes, search.change),
             )
             if rng.random() < 0.3:
                 continue

@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
+from app.api.plan_formats.antimeridian import closed, cut_line, cut_ring
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
 from app.domain.fields import declared_fields
-from app.domain.geometry import unrolled
 from app.domain.problem import UAV, NoFlyZone, Target
 from app.domain.records import item_to_record
 
-Point = tuple[float, float]
-
 MEDIA_TYPE = "application/geo+json"
-LARGEST_LONGITUDE = 180.0
 
 
 def geojson(plan: FlownPlan) -> str:
     """Write a feature collection: a Point a UAV and an area, a Polygon a zone, a LineString a UAV that flies.
 
     The positions of a ``local`` problem are no longitudes and latitudes, which RFC 7946 has only by prior
-    arrangement: the member ``coordinates`` says which they are. A line that crosses the antimeridian is cut
-    there into a MultiLineString (section 3.1.9), and a zone into a MultiPolygon.
+    arrangement: the member ``coordinates`` says which they are. What crosses the antimeridian is cut there
+    (section 3.1.9).
     """
     geographic = plan.problem.crs == "wgs84"
     features = [_start(route) for route in plan.routes]
@@ -101,7 +95,7 @@ def _line(plan: FlownPlan, route: FlownRoute, *, geographic: bool) -> dict[str, 
         places += stop.path[1:]
     if route.return_distance > 0:
         places += route.return_path[1:]
-    lines = _cut(places) if geographic else [places]
+    lines = cut_line(places) if geographic else [places]
     several = len(lines) > 1
     coordinates = [[list(point) for point in line] for line in lines]
     return _feature(
@@ -138,57 +132,16 @@ def _times(stop: FlownStop) -> dict[str, float | None]:
 
 
 def _zone(zone: NoFlyZone, *, geographic: bool) -> dict[str, Any]:
+    rings = cut_ring(zone.polygon) if geographic else [list(zone.polygon)]
+    polygons = [[[list(point) for point in closed(ring)]] for ring in rings]
+    several = len(polygons) > 1
     properties = _fields(zone, {"id": {"zone_id": zone.id}, "polygon": {}})
-    rings = _halves(zone.polygon) if geographic else [list(zone.polygon)]
-    polygons = [[_ring(each)] for each in rings]
-    if len(polygons) == 1:
-        return _feature("no_fly_zone", "Polygon", polygons[0], **properties)
-    return _feature("no_fly_zone", "MultiPolygon", polygons, **properties)
-
-
-def _ring(corners: Sequence[Point]) -> list[list[float]]:
-    """Close a ring, counter-clockwise (section 3.1.6)."""
-    closed = [*corners, corners[0]]
-    area = sum(x_a * y_b - x_b * y_a for (x_a, y_a), (x_b, y_b) in pairwise(closed))
-    return [list(point) for point in (closed if area >= 0 else reversed(closed))]
-
-
-def _halves(corners: Sequence[Point]) -> list[list[Point]]:
-    """Cut a polygon where it crosses the antimeridian, into what lies west of it and what lies east of it."""
-    xs = unrolled("wgs84", np.array([x for x, _ in corners])).tolist()
-    if max(xs) <= LARGEST_LONGITUDE:
-        return [list(corners)]
-    ring = list(zip(xs, (y for _, y in corners), strict=True))
-    west, east = _side(ring, -1.0), _side(ring, 1.0)
-    moved = [(x - 360.0, y) for x, y in east]
-    # One that only touches the antimeridian has nothing beyond it.
-    return [part for part in (west, moved) if len({x for x, _ in part}) > 1]
-
-
-def _side(ring: Sequence[Point], sign: float) -> list[Point]:
-    """Return what of a polygon lies at longitudes of at least 180 degrees (sign 1), or at most (-1)."""
-    kept: list[Point] = []
-    for (x_a, y_a), (x_b, y_b) in pairwise([*ring, ring[0]]):
-        a, b = (sign * (x - LARGEST_LONGITUDE) for x in (x_a, x_b))
-        if a >= 0:
-            kept.append((x_a, y_a))
-        if a * b < 0:
-            kept.append((LARGEST_LONGITUDE, y_a + (y_b - y_a) * a / (a - b)))
-    return kept
-
-
-def _cut(places: Sequence[Point]) -> list[list[Point]]:
-    """Cut a line where it crosses the antimeridian; every leg takes the shorter way round."""
-    lines = [[places[0]]]
-    for (x_a, y_a), (x_b, y_b) in pairwise(places):
-        if abs(x_b - x_a) > 180.0:
-            edge = 180.0 if x_a > 0 else -180.0
-            there = x_b + 2 * edge
-            y = y_a if there == x_a else y_a + (y_b - y_a) * (edge - x_a) / (there - x_a)
-            lines[-1].append((edge, y))
-            lines.append([(-edge, y)])
-        lines[-1].append((x_b, y_b))
-    return lines
+    return _feature(
+        "zone",
+        "MultiPolygon" if several else "Polygon",
+        polygons if several else polygons[0],
+        **properties,
+    )
 
 
 def _feature(kind: str, geometry: str, coordinates: Any, **properties: Any) -> dict[str, Any]:

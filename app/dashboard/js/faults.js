@@ -18,7 +18,8 @@ export function wayTo(pointer, problem) {
     if (id !== undefined && get().problem[kind].some((item) => item.id === id)) select({ kind, id });
     set({ view: "problem" });
     const row = `table[data-kind="${kind}"] tr[data-id="${CSS.escape(id ?? "")}"]`;
-    document.querySelector(`${row} td[data-column^="${CSS.escape(field)}"]`)?.focus();
+    const cell = [field, rest[0] ?? ""].map((each) => document.querySelector(`${row} td[data-column^="${CSS.escape(each)}"]`)).find(Boolean);
+    cell?.focus();
   };
   const where = id === undefined ? (PARTS[pointer] ?? pointer) : [id, rest[0]].filter(Boolean).join(", ");
   return h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where);

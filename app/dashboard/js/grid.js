@@ -31,13 +31,13 @@ export class Grid {
   /**
    * Show items; rows of items that did not change are kept.
    * @param {object[]} items
-   * @param {{name: string, title: string, read: (item: object) => any, optional?: boolean}[]} columns
+   * @param {{name: string, title: string, read: (item: object) => any, text?: boolean}[]} columns
    */
   show(items, columns) {
     const sameColumns = columns.map((c) => c.title).join() === this.columns.map((c) => c.title).join();
     if (!sameColumns) {
       this.rows.clear();
-      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "visually-hidden" }, "Delete")));
+      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" || column.text ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "visually-hidden" }, "Delete")));
     }
     this.columns = columns;
     const active = document.activeElement?.closest?.("table") === this.element ? document.activeElement.closest("td") : null;
@@ -111,7 +111,9 @@ export class Grid {
     for (const [key, detail] of faults) {
       const cut = key.indexOf("/");
       const [row, name] = [key.slice(0, cut), key.slice(cut + 1)];
-      const cell = this.rows.get(this.items[Number(row)]?.id)?.element.querySelector(`td[data-column="${CSS.escape(name)}"]`);
+      const cells = this.rows.get(this.items[Number(row)]?.id)?.element;
+      // What is wrong with a word of a list is shown at the list.
+      const cell = [name, name.split("/")[0]].map((each) => cells?.querySelector(`td[data-column="${CSS.escape(each)}"]`)).find(Boolean);
       cell?.setAttribute("aria-invalid", "true");
       if (cell) cell.title = detail;
     }
@@ -135,7 +137,7 @@ export class Grid {
   #row(item) {
     const cells = this.columns.map((column) => {
       const value = column.read(item);
-      return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" ? null : "num", dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
+      return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" || column.text ? null : "num", dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
     });
     const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": `Delete ${item.id}`, title: `Delete ${item.id}` }, "×");
     return h("tr", { role: "row", dataset: { id: item.id } }, cells, h("td", { role: "gridcell", tabindex: "-1" }, remove));

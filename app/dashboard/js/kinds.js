@@ -3,6 +3,10 @@
 /** By the `kind` that rows of a table and features of a map have: the list of the problem they are of. */
 export const KINDS = { uav: "uavs", area: "targets" };
 
+/** Zones, which are polygons: their `kind`, and the list of the problem they are of. */
+export const ZONE = "zone";
+export const ZONES = "no_fly_zones";
+
 /** What ids begin with, by the list. */
 export const STEMS = Object.fromEntries(Object.entries(KINDS).map(([kind, list]) => [list, kind]));
 

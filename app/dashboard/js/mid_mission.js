@@ -170,15 +170,11 @@ function waitOnGround(uav, stop) {
   return onGround ? time : 0;
 }
 
-const later = (name, item, time) => (item[name] == null ? {} : { [name]: item[name] - time });
-const notBefore = (name, item, time) => (item[name] ? { [name]: Math.max(0, item[name] - time) } : {});
-
 /**
  * The mission at a moment as a problem.
  *
- * Material counts as unloaded when a visit begins. Times are counted from the moment on. The distance weight is the
- * one that the plan was found with, so that rewards before and after can be compared. What changes against a plan
- * before that cost is not counted again.
+ * Material counts as unloaded when a visit begins. All times are counted from the moment on. The distance weight is
+ * the one that the plan was found with, so that rewards before and after can be compared.
  *
  * @param {object} problem what was allocated
  * @param {object} answer the plan for it
@@ -197,11 +193,13 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
     }
     if (lost.has(uavId(uav, i))) return;
     const ret = now.returning && (uav.ret || !recall) ? 1 : 0;
+    const visited = new Set(answer.routes[i].stops.slice(0, now.done).map((stop) => stop.target_id));
     uavs.push({
       ...uav, id: uavId(uav, i), x_c: now.place[0], y_c: now.place[1], dis: now.flown, ret, loadlist: load,
-      ...notBefore("available_from", uav, time), ...later("available_until", uav, time),
+      ...(uav.committed ? { committed: uav.committed.filter((id) => !visited.has(id)) } : {}),
+      ...(uav.available_from ? { available_from: Math.max(0, uav.available_from - time) } : {}),
+      ...(uav.available_until == null ? {} : { available_until: uav.available_until - time }),
       ...(uav.endurance == null ? {} : { airborne: (uav.airborne ?? 0) + Math.max(0, time - now.tookOff) }),
-      ...(uav.committed ? { committed: uav.committed.slice(now.done) } : {}),
     });
   });
   const targets = problem.targets.map((target, j) => {
@@ -212,15 +210,14 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
       ...target, id, loadlist,
       // What an area asked for at first stays the measure of what it has.
       ...(served ? { requested: requestedBy(target) } : {}),
-      ...later("deadline", target, time), ...notBefore("earliest", target, time),
+      ...(target.deadline == null ? {} : { deadline: target.deadline - time }),
+      ...(target.earliest ? { earliest: Math.max(0, target.earliest - time) } : {}),
     };
   });
-  const { start_plan: before, ...rest } = problem;
-  const unchanging = before === undefined ? {} : { change_weight: 0 };
-  return {
-    ...rest, uavs, targets,
-    objective: { ...problem.objective, distance_weight: answer.distance_weight, ...unchanging },
-  };
+  // The plan to begin from was one of the whole mission, and so is what its changes cost.
+  const { start_plan: _plan, ...rest } = problem;
+  const { change_weight: _weight, ...objective } = rest.objective ?? {};
+  return { ...rest, uavs, targets, objective: { ...objective, distance_weight: answer.distance_weight } };
 }
 
 /** An area with other needs than were left: it asked for as much more or less at first. */

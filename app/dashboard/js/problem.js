@@ -2,6 +2,7 @@
 
 import { change } from "./history.js";
 import { STEMS } from "./kinds.js";
+import { withAdded, withRemoved, withRenamed } from "./references.js";
 import { amountsOf } from "./schema.js";
 import { BEGINNING, get, select, set } from "./state.js";
 
@@ -58,14 +59,19 @@ export function edit(changed) {
 
 /** Change fields of a UAV or area; undefined takes a field out. @param {"uavs"|"targets"} kind */
 export function update(kind, id, fields) {
-  edit((problem) => ({
-    [kind]: problem[kind].map((item) => (item.id === id ? present({ ...item, ...fields }) : item)),
-  }));
+  edit((problem) => {
+    const items = problem[kind].map((item) => (item.id === id ? present({ ...item, ...fields }) : item));
+    const changed = { ...problem, [kind]: items };
+    return fields.id && fields.id !== id ? withRenamed(changed, get().fields, kind, id, fields.id) : changed;
+  });
   if (fields.id && get().selection?.id === id) set({ selection: { kind, id: fields.id } });
 }
 
 export function remove(kind, id) {
-  edit((problem) => ({ [kind]: problem[kind].filter((item) => item.id !== id) }));
+  edit((problem) => {
+    const at = problem[kind].findIndex((item) => item.id === id);
+    return at < 0 ? {} : withRemoved(problem, get().fields, kind, at);
+  });
   if (get().selection?.id === id) set({ selection: null });
 }
 
@@ -86,7 +92,7 @@ export function place(kind, { x, y }) {
     kind === "uavs"
       ? { id, x_s: x, y_s: y, speed: last?.speed ?? 1, voyage: last?.voyage ?? reach(problem), loadlist }
       : { id, x, y, level: last?.level ?? 1, loadlist };
-  edit((now) => ({ [kind]: [...now[kind], item] }));
+  edit((now) => withAdded(now, kind, item));
   select({ kind, id });
 }
 
@@ -113,7 +119,10 @@ export function setMaterials(count) {
     const amounts = (list) => Array.from({ length: count }, (_, k) => list[k] ?? 0);
     return items.map((item) => ({ ...item, ...Object.fromEntries(names.filter((name) => item[name]).map((name) => [name, amounts(item[name])])) }));
   };
-  edit((problem) => ({ uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets) }));
+  edit((problem) => ({
+    uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets),
+    ...(problem.materials?.length ? { materials: Array.from({ length: count }, (_, k) => problem.materials[k] ?? {}) } : {}),
+  }));
 }
 
 /** What an area asked for at first, an amount a material. */

@@ -22,7 +22,10 @@ export function fieldsOf(openapi) {
     return Object.fromEntries(Object.entries(all(properties)).map(([name, schema]) => [name, { ...schema, needed: required.includes(name) }]));
   };
   const request = Object.entries(all(defs.AllocationRequest.properties)).filter(([name]) => !(name in defs.ProblemModel.properties));
-  for (const [name, schema] of Object.entries(settings)) if (schema.properties) settings[name] = { ...schema, properties: all(schema.properties) };
+  for (const [name, schema] of Object.entries(settings)) {
+    if (schema.properties) settings[name] = { ...schema, properties: all(schema.properties) };
+    else if (schema.items?.$ref) settings[name] = { ...schema, items: { properties: item(schema) } };
+  }
   const learners = defs.TrainingModel.properties.algorithm.enum;
   return { learners, uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request) };
 }
@@ -30,6 +33,23 @@ export function fieldsOf(openapi) {
 /** Whether a field holds one amount a material. */
 export function isAmounts(schema) {
   return schema.type === "array" && ["number", "integer"].includes(schema.items?.type);
+}
+
+/** Whether a field holds a list of words, or of ids. */
+export function isWords(schema) {
+  return schema.type === "array" && schema.items?.type === "string";
+}
+
+/** Whether a field holds ids of the items of a list. */
+export function isIdsOf(schema, list) {
+  return isWords(schema) && schema.idsOf === list;
+}
+
+/** Settings that are of no items, and so hold for another problem too: one value each, or an object of such. */
+export function heldSettings(problem, fields) {
+  const held = ([, schema]) => schema.type !== "array" && (schema.type !== "object" || schema.properties);
+  const names = new Set(Object.entries(fields.settings).filter(held).map(([name]) => name));
+  return Object.fromEntries(Object.entries(problem).filter(([name]) => names.has(name)));
 }
 
 /** Names of the fields that hold one amount a material, of those of an item. */
@@ -45,6 +65,7 @@ export function wanted(value, schema) {
   if (schema.type === "boolean") return typeof value === "boolean" ? null : "true or false";
   if (schema.type === "string") return typeof value === "string" ? null : "a text";
   if (isAmounts(schema)) return Array.isArray(value) && value.every(Number.isFinite) ? null : "a list of numbers";
+  if (isWords(schema)) return Array.isArray(value) && value.every((word) => typeof word === "string") ? null : "a list of texts";
   if (schema.type === "array") return Array.isArray(value) ? null : "a list";
   if (schema.type === "object") return value && typeof value === "object" && !Array.isArray(value) ? null : "an object";
   return null;

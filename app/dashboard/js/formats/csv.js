@@ -1,7 +1,8 @@
 /** A problem as CSV: a row an item, one of `kind` problem for the settings. Columns are the service's fields. */
 
 import { KINDS } from "../kinds.js";
-import { amountsOf, isAmounts } from "../schema.js";
+import { amountsOf, heldSettings, isAmounts, isWords } from "../schema.js";
+import { wordsIn, writtenWords } from "../words.js";
 import { Numbers, plainText, table, toCells } from "./cells.js";
 import { FormatError } from "./error.js";
 
@@ -12,10 +13,10 @@ function stem(name) {
   return name === "loadlist" ? "load" : name;
 }
 
-/** Settings with their way in the problem; those of an object stand by themselves. */
+/** Settings with their way in the problem; those of an object that is always there stand by themselves. */
 function settingsOf(fields) {
   return Object.entries(fields.settings).flatMap(([name, schema]) =>
-    schema.properties ? Object.entries(schema.properties).map(([inner, each]) => ({ column: inner, path: [name, inner], schema: each })) : [{ column: name, path: [name], schema }]);
+    schema.properties && !schema.nullable ? Object.entries(schema.properties).map(([inner, each]) => ({ column: inner, path: [name, inner], schema: each })) : [{ column: name, path: [name], schema }]);
 }
 
 export function toCsv(problem, fields) {
@@ -31,7 +32,7 @@ export function toCsv(problem, fields) {
       const row = { kind };
       for (const [name, schema] of Object.entries(fields[list])) {
         if (isAmounts(schema)) item[name]?.forEach((amount, k) => { row[`${stem(name)}_${k + 1}`] = amount; });
-        else row[name] = cell(item[name]);
+        else row[name] = isWords(schema) && item[name] ? writtenWords(item[name]) : cell(item[name]);
       }
       rows.push(row);
     }
@@ -56,8 +57,7 @@ export function fromCsv(text, present, fields) {
   const { separator, columns, rows } = table(text, "kind");
   const settings = settingsOf(fields);
   const reader = new Reader(columns, separator);
-  const { uavs: _u, targets: _t, ...held } = present;
-  const problem = { ...held, uavs: [], targets: [] };
+  const problem = { ...heldSettings(present, fields), uavs: [], targets: [] };
   let set = null;
   for (const { line, cells } of rows) {
     const kind = reader.at(cells, "kind").trim().toLowerCase();
@@ -98,6 +98,7 @@ class Reader {
     if (schema.type === "boolean") return this.#truth(text, line, column);
     if (schema.enum) return schema.enum.find((each) => String(each).toLowerCase() === text.trim().toLowerCase()) ?? this.#refuse(line, column, text, `is none of ${schema.enum.join(", ")}`);
     if (schema.type === "string" || schema.const !== undefined) return plainText(text);
+    if (isWords(schema)) return wordsIn(plainText(text)) ?? this.#refuse(line, column, text, "is no list of words");
     try {
       return JSON.parse(text);
     } catch {

@@ -1,8 +1,12 @@
-/** A problem as GeoJSON (RFC 7946): points with the service's fields as properties, settings as a member. */
+/**
+ * A problem as GeoJSON (RFC 7946): points and polygons with the service's fields as properties, settings as a
+ * member.
+ */
 
-import { KINDS } from "../kinds.js";
+import { KINDS, ZONE, ZONES } from "../kinds.js";
 import { position } from "../problem.js";
-import { isAmounts } from "../schema.js";
+import { heldSettings, isAmounts, isWords } from "../schema.js";
+import { wordsIn } from "../words.js";
 import { FormatError } from "./error.js";
 
 /** Names of longitude and latitude on WGS 84. */
@@ -11,14 +15,28 @@ const DEGREES = /(CRS84h?|EPSG:[\d.]*:?(4326|4979))$/i;
 export function toGeoJson(problem, fields) {
   const { uavs, targets, ...rest } = problem;
   const settings = { ...rest, crs: rest.crs ?? fields.settings.crs.default };
+  const zones = rest[ZONES] ?? [];
+  if (zones.length) delete settings[ZONES];
   const point = ({ x, y }, kind, { id, ...properties }) => ({
     type: "Feature", id, geometry: { type: "Point", coordinates: [x, y] }, properties: { kind, ...properties },
   });
   const features = [
     ...uavs.map((uav) => point(position(uav), "uav", uav)),
     ...targets.map(({ x, y, ...target }) => point({ x, y }, "area", target)),
+    ...zones.map(zoneFeature),
   ];
   return `${JSON.stringify({ type: "FeatureCollection", settings, features }, null, 2)}\n`;
+}
+
+/** A zone, whose ring is closed as the format has it. */
+function zoneFeature({ id, polygon = [], ...properties }) {
+  const closed = polygon.length > 1 && same(polygon[0], polygon.at(-1));
+  const ring = polygon.length && !closed ? [...polygon, polygon[0]] : polygon;
+  return { type: "Feature", id, geometry: { type: "Polygon", coordinates: [ring] }, properties: { kind: ZONE, ...properties } };
+}
+
+function same(a, b) {
+  return JSON.stringify(a) === JSON.stringify(b);
 }
 
 /**
@@ -32,8 +50,7 @@ export function toGeoJson(problem, fields) {
 export function fromGeoJson(collection, present, fields) {
   const { features, settings } = collection;
   if (!Array.isArray(features)) throw new FormatError("it has no list `features`");
-  const { uavs: _u, targets: _t, ...held } = present;
-  const problem = { ...(settings ?? { ...held, crs: "wgs84" }), uavs: [], targets: [] };
+  const problem = { ...(settings ?? { ...heldSettings(present, fields), crs: "wgs84" }), uavs: [], targets: [] };
   // Of a file of this page the service judges the positions.
   if (!settings) onGlobe(collection.crs);
   const notices = [];
@@ -42,18 +59,29 @@ export function fromGeoJson(collection, present, fields) {
     const { kind: given, ...properties } = feature?.properties ?? {};
     const name = nameOf(feature, at);
     if (!feature?.geometry) return notices.push(`${name} has no geometry and was left out`);
-    const kind = KINDS[String(given ?? "").toLowerCase()];
-    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is uav or area`);
+    const known = { ...KINDS, [ZONE]: ZONES };
+    const kind = known[String(given ?? "").toLowerCase()];
+    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is ${Object.keys(KINDS).join(", ")} or ${ZONE}`);
+    const schemas = kind === ZONES ? fields.settings[ZONES].items.properties : fields[kind];
     const item = {};
     for (const [field, value] of Object.entries(properties)) {
       if (field === "id" || value === null) continue;
-      if (field in fields[kind]) item[field] = isAmounts(fields[kind][field]) ? listOf(value) : value;
+      if (field in schemas) item[field] = isAmounts(schemas[field]) || isWords(schemas[field]) ? listOf(value, schemas[field]) : value;
       else foreign.add(field);
     }
-    const [x, y] = placeOf(feature.geometry, name, notices);
-    if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
     const id = feature.id ?? properties.id;
     if (id !== undefined && id !== null) item.id = String(id);
+    const onEarth = ([x, y]) => {
+      if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
+      return [x, y];
+    };
+    if (kind === ZONES) {
+      const polygon = cornersOf(feature.geometry, name);
+      // Of a file of this page the service judges them.
+      (problem[ZONES] ??= []).push({ ...item, polygon: settings ? polygon : polygon.map((corner) => onEarth(pair(corner, name))) });
+      return;
+    }
+    const [x, y] = onEarth(placeOf(feature.geometry, name, notices));
     problem[kind].push(placed(kind, item, x, y));
   });
   if (foreign.size) notices.push(`Attributes that are no fields of a problem were left out: ${[...foreign].join(", ")}`);
@@ -79,9 +107,18 @@ function onGlobe(crs) {
   throw new FormatError(`its \`crs\` is ${name ?? JSON.stringify(crs)}: save it with longitude and latitude on WGS 84 (EPSG:4326)`);
 }
 
+/** The corners of a zone, without the last one, which closes the ring. */
+function cornersOf({ type, coordinates }, name) {
+  if (type !== "Polygon" || !Array.isArray(coordinates?.[0])) throw new FormatError(`${name} is a ${type}: a zone is one Polygon`);
+  const [ring, ...holes] = coordinates;
+  if (holes.length) throw new FormatError(`${name} has ${holes.length} holes: a zone has none`);
+  return ring.length > 1 && same(ring[0], ring.at(-1)) ? ring.slice(0, -1) : ring;
+}
+
 /** A list, which some programs save as its text. */
-function listOf(value) {
+function listOf(value, schema) {
   if (typeof value !== "string") return value;
+  if (isWords(schema)) return wordsIn(value) ?? value;
   try {
     return JSON.parse(value);
   } catch {

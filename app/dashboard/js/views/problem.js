@@ -9,8 +9,9 @@ import { redo, undo } from "../history.js";
 import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
-import { amountsOf, isAmounts } from "../schema.js";
+import { amountsOf, isAmounts, isWords } from "../schema.js";
 import { get, select, subscribe } from "../state.js";
+import { wordsIn, writtenWords } from "../words.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
 /** What people call the fields that have other names; all others go by their own. */
@@ -24,7 +25,7 @@ const SINGLE = ["number", "integer", "boolean", "string"];
 const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
 const NOT_SAID = "The service has not said yet which fields a problem has";
 
-/** Columns of numbers, and of amounts one a material where an item has some. */
+/** Columns of numbers, words and texts, and of amounts one a material where an item has some. */
 function columnsOf(kind, problem) {
   const globe = problem.crs === "wgs84";
   const titled = (name) => {
@@ -32,9 +33,12 @@ function columnsOf(kind, problem) {
     return globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title;
   };
   const known = get().fields?.[kind] ?? {};
-  const plain = ([name, { type }]) => name === "id" || type === "number" || type === "integer";
+  const plain = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
   const held = ([name, schema]) => isAmounts(schema) && problem[kind].some((item) => item[name]);
-  const scalars = Object.entries(known).filter(plain).map(([name]) => ({ name, title: titled(name), read: (item) => item[name] }));
+  const shownAs = (value, schema) => (value && isWords(schema) ? writtenWords(value) : value);
+  const scalars = Object.entries(known).filter(plain).map(([name, schema]) => ({
+    name, title: titled(name), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
+  }));
   const lists = Object.entries(known).filter(held).flatMap(([field]) => Array.from({ length: materials(problem) }, (_, k) => ({
     name: `${field}/${k}`, title: `${titled(field)} ${k + 1}`, read: (item) => item[field]?.[k],
   })));
@@ -48,6 +52,12 @@ function enter(kind, id, name, text) {
     if (!text || get().problem[kind].some((each) => each.id === text)) return notify(`Another id is needed than “${text}”`, "error");
     return update(kind, id, { id: text });
   }
+  const schema = get().fields[kind][name];
+  if (schema && isWords(schema)) {
+    const words = text === "" ? undefined : wordsIn(text);
+    return words === null ? notify(`${name} of ${id} needs words with semicolons between`, "error") : update(kind, id, { [name]: words });
+  }
+  if (schema?.type === "string") return update(kind, id, { [name]: text || undefined });
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
   if (Number.isNaN(value) || (value === undefined && get().fields[kind][field].needed)) return notify(`${name} of ${id} needs a number`, "error");
@@ -205,8 +215,11 @@ function mountSettings(root) {
     const where = h("select", { name: "crs", onchange: () => edit(() => ({ crs: where.value })) }, crs.enum.map((value) => h("option", { value, selected: value === (problem.crs ?? crs.default) }, PLACES[value] ?? value)));
     const single = Object.fromEntries(Object.entries(others).filter(([, { type, enum: words }]) => words || SINGLE.includes(type)));
     const further = new Fields(single, { pointer: "", values: problem, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
-    const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties }]) => {
-      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], onchange: () => edit(() => ({ [name]: form.values() })) });
+    const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties, nullable }]) => {
+      // What may be left out is not there while nothing of it is filled in.
+      const taken = (values) => (nullable && !Object.keys(values).length ? undefined : values);
+      const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, `${name[0].toUpperCase()}${name.slice(1)} ${inner}`])) : {};
+      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
       return form.element;
     });
     root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
