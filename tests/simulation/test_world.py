@@ -1,6 +1,5 @@
 """Plans in a world with times, promises, zones, wind and matrices: the simulator against the referee."""
 
-import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 from problems import random_plan
 from referee import Illegal, replay
-from referee_legs import Legs, home_of, place_of, start_of
+from referee_legs import Legs, apart, home_of, place_of, start_of
 from worlds import random_world
 
 from app.domain.allocation import Allocation, LandingRoute, TimedAllocation, TimedStop
@@ -174,8 +173,8 @@ def check_path(legs, here, there, path, length):
         assert len(points) == 2
         return False
     assert (path[0], path[-1]) == (here[:2], there[:2])
-    assert all(corner in {tuple(map(float, each)) for each in legs.ways.corners} for corner in path[1:-1])
-    assert sum(math.dist(a, b) for a, b in pairwise(path)) == pytest.approx(length)
+    assert legs.corners.issuperset(path[1:-1])
+    assert sum(apart(legs.crs, a, b) for a, b in pairwise(path)) == pytest.approx(length)
     assert list(path) == points
     return True
 

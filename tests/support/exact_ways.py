@@ -16,9 +16,13 @@ Point = tuple[Fraction, Fraction]
 
 
 class ExactWays:
-    """Ways round zones that are given by corners with rational coordinates; no two sides of one cross."""
+    """Ways round zones that are given by corners with rational coordinates; no two sides of one cross.
 
-    def __init__(self, zones):
+    `measure` is the length of a straight piece, where that is not what it is on this plane.
+    """
+
+    def __init__(self, zones, measure=math.dist):
+        self.measure = measure
         self.zones = [[exact(corner) for corner in zone] for zone in zones]
         self.edges = [edge for zone in self.zones for edge in zip(zone, zone[1:] + zone[:1], strict=True)]
         self.corners = sorted({corner for zone in self.zones for corner in zone})
@@ -34,9 +38,9 @@ class ExactWays:
         if self.inside(a) or self.inside(b):
             return math.inf, None
         if a == b or self.free(a, b):
-            return math.dist(a, b), (a, b)
+            return self.measure(a, b), (a, b)
         done = set()
-        heap = [(math.dist(a, c), (a, c)) for c in self.corners if c != a and self.free(a, c)]
+        heap = [(self.measure(a, c), (a, c)) for c in self.corners if c != a and self.free(a, c)]
         heapq.heapify(heap)
         while heap:
             length, points = heapq.heappop(heap)
@@ -53,7 +57,7 @@ class ExactWays:
                     and self.free(here, onward)
                     and self.may_pass(here, minus(before, here), minus(onward, here))
                 ):
-                    heapq.heappush(heap, (length + math.dist(here, onward), (*points, onward)))
+                    heapq.heappush(heap, (length + self.measure(here, onward), (*points, onward)))
         return math.inf, None
 
     def inside(self, point):

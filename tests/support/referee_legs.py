@@ -1,6 +1,7 @@
 """Legs of a problem in plain Python, by section 8 of the rules: length over ground, air length, time.
 
-It shares no code with the product. Zones are for problems on a plane only.
+It shares no code with the product. On the globe ways round zones are looked for on a gnomonic plane, where
+great circles are straight, and measured on the sphere; all is within some degrees there.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from exact_ways import ExactWays
+from exact_ways import ExactWays, exact
 
 
 class Leg(NamedTuple):
@@ -53,7 +54,11 @@ class Legs:
         self.crs = problem.get("crs", "local")
         self.matrices, self.wind = problem.get("matrices"), problem.get("wind")
         zones = [zone["polygon"] for zone in problem.get("no_fly_zones") or ()]
-        self.ways = ExactWays(zones) if zones else None
+        self._middle = zones[0][0] if zones else None
+        self._places = {}
+        flat = [[self._flat(*corner) for corner in zone] for zone in zones]
+        self.ways = ExactWays(flat, self._measure) if zones else None
+        self.corners = {(float(x), float(y)) for zone in zones for x, y in zone}
         self._known = {}
 
     def leg(self, uav, a, b):
@@ -82,8 +87,23 @@ class Legs:
         """The points of the shortest way; None where there is none."""
         if self.ways is None:
             return [(a.x, a.y), (b.x, b.y)]
-        _, points = self.ways.way((a.x, a.y), (b.x, b.y))
-        return points and [(float(x), float(y)) for x, y in points]
+        _, points = self.ways.way(self._flat(a.x, a.y), self._flat(b.x, b.y))
+        return points and [self._places[point] for point in points]
+
+    def _flat(self, x, y):
+        """Where a place is on the plane on which ways are straight."""
+        at = (x, y)
+        if self.crs != "local":
+            lon_0, lat_0, lon, lat = map(math.radians, (*self._middle, x, y))
+            up = math.sin(lat_0) * math.sin(lat) + math.cos(lat_0) * math.cos(lat) * math.cos(lon - lon_0)
+            ahead = math.cos(lat_0) * math.sin(lat) - math.sin(lat_0) * math.cos(lat) * math.cos(lon - lon_0)
+            at = (math.cos(lat) * math.sin(lon - lon_0) / up, ahead / up)
+        self._places[exact(at)] = (float(x), float(y))
+        return at
+
+    def _measure(self, a, b):
+        """Length of a straight piece, by its ends on the plane."""
+        return apart(self.crs, self._places[a], self._places[b])
 
     def _given(self, uav, row, column):
         matrix = self.matrices[uav.get("profile") or next(iter(self.matrices))]

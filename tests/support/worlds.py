@@ -12,10 +12,7 @@ from app.domain.problem import NoFlyZone, Problem, Wind
 
 
 def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
-    """A random problem with each of the fields of the world now and then, in sizes that matter.
-
-    Zones are only on a plane.
-    """
+    """A random problem with each of the fields of the world now and then, in sizes that matter."""
     problem = random_problem(rng, max_uavs, max_targets)
     across = problem.extent / float(np.median([uav.speed for uav in problem.uavs]))
     problem = _timed(problem, rng, across)
@@ -26,7 +23,7 @@ def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int =
         slowest = min(uav.speed for uav in problem.uavs)
         wind = Wind(slowest * float(rng.uniform(0.0, 1.2)), float(rng.uniform(-360, 360)))
         problem = replace(problem, wind=wind)
-    if problem.crs == "local" and rng.random() < 0.6:
+    if rng.random() < 0.6:
         problem = replace(problem, no_fly_zones=_zones(problem, rng))
     return problem
 
@@ -128,10 +125,11 @@ def _zones(problem: Problem, rng: np.random.Generator) -> tuple[NoFlyZone, ...]:
     """One to three zones of three to five corners, which may overlap."""
     xs = [uav.x_s for uav in problem.uavs] + [target.x for target in problem.targets]
     ys = [uav.y_s for uav in problem.uavs] + [target.y for target in problem.targets]
+    across = problem.extent if problem.crs == "local" else math.hypot(max(xs) - min(xs), max(ys) - min(ys))
     zones = []
     for number in range(int(rng.integers(1, 4))):
         x, y = rng.uniform(min(xs), max(xs) + 1e-9), rng.uniform(min(ys), max(ys) + 1e-9)
-        size, corners = problem.extent * rng.uniform(0.05, 0.25), int(rng.integers(3, 6))
+        size, corners = across * rng.uniform(0.05, 0.25), int(rng.integers(3, 6))
         angles = (np.arange(corners) + rng.uniform(0, 0.8, corners)) / corners * 2 * math.pi
         polygon = tuple(
             (float(x + size * math.cos(angle)), float(y + size * math.sin(angle))) for angle in angles
