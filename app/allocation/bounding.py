@@ -58,7 +58,9 @@ def bound_answer(
 
 def everything(problem: Problem) -> float:
     """Return what meeting every need would earn if nobody had to fly for it: a bound that takes no time."""
-    return math.fsum(target.level for target in problem.targets if any(target.loadlist))
+    objective = problem.objective
+    most = 1.0 + (objective.minimum_weight - 1.0) * objective.minimum_share
+    return most * math.fsum(target.level for target in problem.targets if any(target.loadlist))
 
 
 def proof_answer(problem: Problem, proof: Proof | None) -> dict[str, Any] | None:

@@ -12,6 +12,7 @@ from app.allocation import bounding
 from app.allocation.answer_time import AnswerTime
 from app.allocation.explaining import PENDING, REASONS, account_of
 from app.allocation.found import BestKnown, Found, best_known
+from app.allocation.legality import require_legal
 from app.allocation.time_limit import TimeLimit
 from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
@@ -21,7 +22,6 @@ from app.domain.warnings import problem_warnings
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
-from app.simulation.evaluation import reward_of
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import Deadline
@@ -63,8 +63,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
         context.end_within(payload["run_time_limit_s"])
     problem = problem_from_record(payload["problem"])
     if problem.start_plan:
-        # An illegal one is refused by name.
-        reward_of(problem, Plan(problem.start_plan))
+        require_legal(problem, Plan(problem.start_plan), "/start_plan")
     algorithm, known = payload["algorithm"], best_known(problem, payload)
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
     if limit.leaves_none_for(algorithm):

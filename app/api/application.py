@@ -30,7 +30,17 @@ from app.api.job_kinds import BATCH, job_kinds
 from app.api.json_body import BodyLimit
 from app.api.metrics import Metrics
 from app.api.request_log import RequestLog
-from app.api.routes import algorithms, allocation, batch, examples, jobs, library, operations, plans
+from app.api.routes import (
+    algorithms,
+    allocation,
+    batch,
+    evaluation,
+    examples,
+    jobs,
+    library,
+    operations,
+    plans,
+)
 from app.api.security_headers import SecurityHeaders
 from app.api.services import Services
 from app.api.threads import started_threads
@@ -131,7 +141,7 @@ def create_application(settings: Settings) -> FastAPI:
         generate_unique_id_function=operation_id,
         middleware=_middleware(settings, metrics),
     )
-    for room in (allocation, batch, algorithms, jobs, plans, library, examples, operations):
+    for room in (allocation, evaluation, batch, algorithms, jobs, plans, library, examples, operations):
         application.include_router(room.router)
     install_error_handlers(application)
     install_dashboard(application, settings)

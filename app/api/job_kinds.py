@@ -16,6 +16,7 @@ from policy_store.library import PolicyLibrary
 
 ALLOCATE = "allocate"
 BATCH = "batch"
+EVALUATE = "evaluate"
 TRAIN = "train"
 REGISTER = "register"
 
@@ -64,6 +65,7 @@ def job_kinds(
             effort=_effort,
             follow_up=_REASONS,
         ),
+        JobKind(EVALUATE, "app.allocation.evaluating:evaluate", "interactive", max_run_s=max_run_s),
         JobKind(BATCH, "app.allocation.tasks:allocate", "batch", max_run_s=max_run_s, follow_up=_REASONS),
         JobKind(TRAIN, "app.allocation.tasks:train", "training", add_to_library, max_run_s=max_training_s),
         # The weights are the job's artifact, and the policy's.

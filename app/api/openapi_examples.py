@@ -30,6 +30,14 @@ _SMALL_TASK: dict[str, Any] = {
 }
 
 
+EVALUATION_EXAMPLES: dict[str, Example] = {
+    "own": Example(
+        summary="A plan of one's own, and what remains of the problem after a while",
+        value={**_SMALL_TASK, "assignment": [[0, 2], [1, 3]], "at": 0.5},
+    )
+}
+
+
 BATCH_EXAMPLES: dict[str, Example] = {
     "two": Example(
         summary="Two small problems",

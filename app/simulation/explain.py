@@ -49,16 +49,8 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     IllegalPlan
         If one of its actions is not allowed; ``details`` has step (from 1), uav_id and rule.
     """
-    arrays = compile_problem(problem)
-    actions = plan.as_array()
-    result, given = replayed(problem, arrays, actions)
-
-    # Nobody is sent home in this replay: at its end every UAV is still at its last stop, which is where the
-    # leg home begins and where one more visit would begin.
-    episodes = simulator.new_episodes(arrays, 1)
-    trace = _new_trace(actions, problem.n_materials, given)
-    _trace(arrays, episodes, actions, given is not None, trace)
-    tidy(arrays, actions, trace.delivered, episodes.need[0])
+    arrays, actions = compile_problem(problem), plan.as_array()
+    result, trace, episodes = _traced(problem, arrays, actions)
     world = uses_world(problem)
     routes = _timed_routes(problem, actions, trace, episodes) if world else _routes(problem, actions, trace)
     allocation = Allocation(
@@ -75,6 +67,35 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     return TimedAllocation(
         **_values(allocation), makespan=float(result.makespan[0]), changes=_changes(problem, actions)
     )
+
+
+def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
+    """Return what every UAV does in a plan, with all times, whatever the problem uses of the world.
+
+    Raises
+    ------
+    IllegalPlan
+        As :func:`explain` does.
+    """
+    arrays, actions = compile_problem(problem), plan.as_array()
+    _, trace, episodes = _traced(problem, arrays, actions)
+    return tuple(_timed_routes(problem, actions, trace, episodes))
+
+
+def _traced(
+    problem: Problem, arrays: ProblemArrays, actions: Actions
+) -> tuple[simulator.Replay, Trace, simulator.Episodes]:
+    """Replay a plan, and trace it.
+
+    Nobody is sent home in the trace: at its end every UAV is still at its last stop, which is where the leg
+    home begins and where one more visit would begin.
+    """
+    result, given = replayed(problem, arrays, actions)
+    episodes = simulator.new_episodes(arrays, 1)
+    trace = _new_trace(actions, problem.n_materials, given)
+    _trace(arrays, episodes, actions, given is not None, trace)
+    tidy(arrays, actions, trace.delivered, episodes.need[0])
+    return result, trace, episodes
 
 
 def _routes(problem: Problem, actions: Actions, trace: Trace) -> Iterator[Route]:

@@ -34,6 +34,8 @@ class Instance(NamedTuple):
         Cost of a unit of distance, λ / scale.
     idle
         (M,) what a UAV earns that visits nothing: 0, or less where its way home is charged.
+    exact
+        Whether the relaxation has every rule there is; otherwise its optimum need not be reached.
     useful
         (M, N) targets at which a UAV that does not return could unload something.
     """
@@ -45,6 +47,7 @@ class Instance(NamedTuple):
     load: Floats
     price: float
     idle: Floats
+    exact: bool
     useful: Flags
 
 
@@ -65,7 +68,14 @@ def new_instance(problem: Problem) -> Instance:
     # As a product of matrices: with many materials much quicker than comparing each with each.
     useful = out[:, None] & ((load > 0).astype(np.float32) @ (need > 0).astype(np.float32).T > 0)
     idle = np.where(charged, -price * arrays.uavs["start_home"][0], 0.0)
-    return Instance(arrays, scale, worth, need, load, price, idle, useful)
+    return Instance(arrays, scale, worth, need, load, price, idle, _is_exact(arrays), useful)
+
+
+def _is_exact(arrays: ProblemArrays) -> bool:
+    terms, uavs = arrays.terms[0], arrays.uavs[0]
+    left_out = terms["decay"] or terms["bonus"] or terms["makespan"] or terms["change"] or terms["timed"]
+    waits = arrays.areas["earliest"][0].any() or uavs["watched"].any() or arrays.committed.size
+    return not (left_out or waits or not terms["metric"])
 
 
 def rounded(values: Floats) -> Floats:

@@ -63,7 +63,8 @@ def upper_bound(problem: Problem, reward: float | None, stop: StopCriterion) -> 
     else:
         tree = Tree(instance, sets, lower)
         tree.run(stop)
-        value, tight = tree.bound, tree.proven and tree.attained
+        reached = instance.exact or tree.bound <= lower
+        value, tight = tree.bound, tree.proven and tree.attained and reached
     return UpperBound(_without_margin(instance, lower, value) * instance.scale, tight)
 
 

@@ -1,0 +1,61 @@
+"""A plan of somebody's own, evaluated without any search."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.allocation import bounding
+from app.allocation.answer_time import AnswerTime
+from app.allocation.explaining import account_of
+from app.allocation.legality import require_legal
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.domain.records import problem_from_record, problem_to_record, to_record
+from app.domain.warnings import problem_warnings
+from app.jobs.model import WorkResult
+from app.jobs.work_context import WorkContext
+from app.simulation.mid_mission import remaining_at
+from app.solvers.stop import Deadline
+
+_TIMES = AnswerTime()
+"""How long accounts take; nobody asks."""
+
+
+def evaluate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+    """Say what a plan earns, when what happens in it, and which of its actions break a rule.
+
+    Parameters
+    ----------
+    payload
+        ``problem`` (a record), ``assignment``, ``bound_time_limit_s`` where a bound is asked for, and ``at``,
+        a clock, where the problem that remains then is.
+    context
+        Once it is cancelled, reasons are looked for no further.
+
+    Returns
+    -------
+    WorkResult
+        The answer of ``POST /evaluate`` but for ``job_id`` and ``elapsed_s``.
+
+    Raises
+    ------
+    IllegalPlan
+        As :func:`~app.allocation.legality.require_legal` raises it.
+    """
+    problem = problem_from_record(payload["problem"])
+    plan = Plan(tuple(map(tuple, payload["assignment"])))
+    require_legal(problem, plan, "/assignment")
+    fields = account_of(problem, plan, context.cancelled, _TIMES).fields
+    limit = payload.get("bound_time_limit_s")
+    at = payload.get("at")
+    result = {
+        **fields,
+        "warnings": to_record(problem_warnings(problem)),
+        **bounding.bound_answer(problem, fields["reward"], limit, Deadline(limit or 0.0)),
+        "remaining": None if at is None else _remaining(problem, plan, at),
+    }
+    return WorkResult(result)
+
+
+def _remaining(problem: Problem, plan: Plan, at: float) -> dict[str, Any]:
+    return problem_to_record(remaining_at(problem, plan, at))

@@ -1,0 +1,57 @@
+"""Refusing a plan that a request brings and that breaks a rule, with every action that does."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from app.domain.errors import IllegalPlan, Violation
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.simulation.breaches import Breach, breaches_of
+from app.simulation.evaluation import reward_of
+
+
+def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
+    """Refuse a plan that breaks a rule.
+
+    Parameters
+    ----------
+    problem, plan
+        The problem, and the plan of it.
+    pointer
+        JSON pointer to the plan in the request.
+
+    Raises
+    ------
+    IllegalPlan
+        With a violation for every action that breaks a rule, and the figures in ``details["breaches"]``.
+        Where unloading is planned, with the first one.
+    """
+    if problem.objective.unloading != "greedy":
+        reward_of(problem, plan)
+        return
+    breaches = breaches_of(problem, plan)
+    if not breaches:
+        return
+    place = {uav.id: f"/{i}" for i, uav in enumerate(problem.uavs)}
+    violations = [
+        Violation(f"{pointer}/{breach.step - 1}{place.get(breach.uav_id or '', '')}", _figures(breach))
+        for breach in breaches
+    ]
+    first = breaches[0]
+    more = f" (and {len(breaches) - 1} more)" if len(breaches) > 1 else ""
+    raise IllegalPlan(
+        f"step {first.step}, {_figures(first)}{more}",
+        violations,
+        details={"breaches": [asdict(breach) for breach in breaches]},
+    )
+
+
+def _figures(breach: Breach) -> str:
+    """Write a broken rule with its figures."""
+    who = "the plan" if breach.uav_id is None else breach.uav_id
+    where = "" if breach.target_id is None else f" to {breach.target_id}"
+    says = f"{who}{where}: {breach.says}"
+    if breach.needed is None or breach.had is None:
+        return says
+    return f"{says}: {breach.needed:.6g} needed, {breach.had:.6g} there"

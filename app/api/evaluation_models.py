@@ -1,0 +1,63 @@
+"""An evaluation on the wire: somebody's own plan, and what follows from it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from app.api.allocation_models import (
+    MAX_TIME_LIMIT_S,
+    AnswerModel,
+    RouteModel,
+    UnmetModel,
+    WarningModel,
+)
+from app.api.problem_models import ProblemModel
+from app.api.wire_fields import Whole
+
+
+class EvaluationRequest(ProblemModel):
+    """A problem, and a plan of it."""
+
+    assignment: list[list[Whole]] = Field(
+        min_length=1,
+        description="One joint action a step: for each UAV the index of its target, or N for home",
+    )
+    bound: bool = Field(
+        default=False, description="Whether the answer has an upper bound on the reward of any plan"
+    )
+    bound_time_limit_s: float = Field(
+        default=5.0, gt=0, le=MAX_TIME_LIMIT_S, description="Seconds to look for the bound"
+    )
+    at: float | None = Field(
+        default=None,
+        ge=0,
+        le=1e12,
+        description="A clock of the plan: the answer then has the problem that remains at it",
+    )
+
+
+class Evaluation(AnswerModel):
+    """What a plan earns and does."""
+
+    job_id: str = Field(description="The job that evaluated it")
+    assignment: list[list[int]] = Field(description="The plan")
+    reward: float = Field(description="As of `POST /allocate`")
+    satisfaction: float = Field(description="As of `POST /allocate`")
+    distance: float = Field(description="As of `POST /allocate`")
+    distance_weight: float = Field(description="λ as it was used")
+    bound: float | None = Field(default=None, description="As of `POST /allocate`")
+    gap: float | None = Field(default=None, description="As of `POST /allocate`")
+    routes: list[RouteModel] = Field(description="One a UAV")
+    unmet: list[UnmetModel] = Field(description="Areas with needs left, each with the reason")
+    reasons: str = Field(default="complete", description="As of `POST /allocate`")
+    warnings: list[WarningModel] = Field(default_factory=list, description="As of `POST /allocate`")
+    makespan: float | None = Field(default=None, description="As of `POST /allocate`")
+    changes: int | None = Field(default=None, description="As of `POST /allocate`")
+    remaining: dict[str, Any] | None = Field(
+        default=None,
+        description="The problem as it stands at `at`, ready to be allocated: who is where with what, needs "
+        "with `requested`, what is under way as `committed`, and the rest of the plan as `start_plan`",
+    )
+    elapsed_s: float = Field(description="Seconds from the request's arrival to the answer")

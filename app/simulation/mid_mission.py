@@ -1,0 +1,243 @@
+"""The problem that remains at a moment of a plan: who is where, with what, and what is still needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.domain.allocation import LandingRoute, TimedStop
+from app.domain.plan import Plan
+from app.domain.problem import ROUNDING, UAV, Problem, Target
+from app.simulation.breaches import breaches_of
+from app.simulation.explain import timed_routes
+from app.travel.choice import legs_between
+from app.travel.legs import Legs, Way
+from app.travel.wind import Wind
+
+
+def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
+    """Return the problem as it stands at a clock of a plan, ready to be allocated (section 11).
+
+    A UAV between two places is on its way, and committed to the visit that it is flying to; with matrices it
+    is where it is flying to, and available when it arrives. One that unloads is there until it has, with the
+    unloading done. Who has landed for good is returning. The rest of the plan is the ``start_plan``.
+
+    Parameters
+    ----------
+    problem, plan
+        The problem and a legal plan of it.
+    at
+        On the clock of the problem.
+
+    Raises
+    ------
+    IllegalPlan
+        If the plan is not legal.
+    """
+    routes = timed_routes(problem, plan)
+    index = {target.id: j for j, target in enumerate(problem.targets)}
+    needs = [list(target.loadlist) for target in problem.targets]
+    flights = [_Flight(problem, i, route, at) for i, route in enumerate(routes)]
+    for flight in flights:
+        for stop in flight.begun:
+            need = needs[index[stop.target_id]]
+            for k, amount in enumerate(stop.delivered):
+                need[k] -= amount
+    rests = [[index[stop.target_id] for stop in flight.rest] for flight in flights]
+    left = replace(
+        problem,
+        uavs=tuple(flight.uav for flight in flights),
+        targets=tuple(map(_with_need, problem.targets, needs)),
+        start_plan=((problem.n_targets,) * problem.n_uavs,),
+    )
+    return replace(left, start_plan=_legal_rest(left, rests))
+
+
+def _legal_rest(problem: Problem, rests: list[list[int]]) -> tuple[tuple[int, ...], ...]:
+    """Return the rest of a plan as joint actions.
+
+    Steps count anew, so UAVs may come to a target in another order: a visit that is left without anything to
+    unload is left out.
+    """
+    home, ids = problem.n_targets, {uav.id: i for i, uav in enumerate(problem.uavs)}
+    while True:
+        steps = max(1, *map(len, rests))
+        rows = tuple(tuple(rest[s] if s < len(rest) else home for rest in rests) for s in range(steps))
+        broken = breaches_of(problem, Plan(rows)) if problem.objective.unloading == "greedy" else []
+        if not broken:
+            return rows
+        first = broken[0]
+        del rests[ids[str(first.uav_id)]][first.step - 1]
+
+
+def _with_need(target: Target, need: Sequence[float]) -> Target:
+    whole = target.loadlist if target.requested is None else target.requested
+    left = tuple(
+        amount if amount >= ROUNDING * all_of else 0.0 for amount, all_of in zip(need, whole, strict=True)
+    )
+    return target if left == target.loadlist else replace(target, loadlist=left, requested=whole)
+
+
+@dataclass(frozen=True, slots=True)
+class _Leg:
+    """A leg as it is flown: from when to when, its air length, and its way; no way with matrices."""
+
+    takeoff: float
+    arrival: float
+    air: float
+    way: Way | None
+
+
+class _Flight:
+    """One UAV at a moment of its route.
+
+    Attributes
+    ----------
+    uav
+        As it is then.
+    begun, rest
+        Visits that have begun, and those that have not.
+    """
+
+    def __init__(self, problem: Problem, i: int, route: LandingRoute, at: float) -> None:
+        self._problem, self._i, self._at = problem, i, at
+        self.begun: list[TimedStop] = []
+        self.rest: list[TimedStop] = [stop for stop in route.stops if isinstance(stop, TimedStop)]
+        self.uav = problem.uavs[i]
+        self._home = self.uav.location if self.uav.home_location is None else self.uav.home_location
+        if not self.uav.ret:
+            self.uav = self._fly(route)
+
+    def _fly(self, route: LandingRoute) -> UAV:
+        uav, at = self.uav, self._at
+        on_ground = (uav.x_c, uav.y_c) == (uav.x_s, uav.y_s) and self._home == uav.location
+        on_ground = on_ground and uav.dis == 0.0 and uav.airborne == 0.0
+        clock, flown, aloft, place = uav.available_from, uav.dis, uav.airborne, None
+        if at <= clock:
+            return uav
+        while self.rest:
+            stop = self.rest[0]
+            target = self._target(stop)
+            wait = 0.0
+            if on_ground and place is None:
+                # It takes off no sooner than it has to, and no later than its deadline lets it.
+                last = math.inf if target.deadline is None else target.deadline
+                wait = max(0.0, min(stop.begin_time, last) - stop.arrival_time)
+            leg = self._leg(clock + wait, stop.arrival_time + wait, stop.distance, place, target)
+            if at < leg.takeoff:
+                return replace(uav, available_from=at)
+            if at < stop.begin_time:
+                going = (stop.target_id, *uav.committed[len(self.begun) + 1 :])
+                return replace(self._on_way(leg, flown, aloft, target), committed=going)
+            self.begun.append(self.rest.pop(0))
+            clock, flown, place = stop.departure_time, flown + leg.air, target
+            aloft += stop.departure_time - leg.takeoff
+            uav = self._after(uav, stop)
+            if at < clock:
+                return self._at_place(uav, target, clock, flown, aloft)
+        if place is None:
+            return replace(uav, available_from=at)
+        if not self._problem.objective.return_to_base:
+            return replace(self._at_place(uav, place, at, flown, aloft), ret=True)
+        self.uav = uav
+        landing = clock if route.landing is None else route.landing.time
+        leg = self._leg(clock, landing, route.return_distance, place, None)
+        if at < landing and leg.way is not None:
+            return self._on_way(leg, flown, aloft, None)
+        there = self._at_place(uav, None, max(at, landing), flown + leg.air, aloft + landing - clock)
+        return replace(there, ret=True)
+
+    def _target(self, stop: TimedStop) -> Target:
+        return next(target for target in self._problem.targets if target.id == stop.target_id)
+
+    def _after(self, uav: UAV, stop: TimedStop) -> UAV:
+        """Return the UAV without what a visit has unloaded; a commitment to it is kept."""
+        whole = self._problem.uavs[self._i].loadlist
+        left = tuple(
+            have - gone if have - gone >= ROUNDING * all_of else 0.0
+            for have, gone, all_of in zip(uav.loadlist, stop.delivered, whole, strict=True)
+        )
+        return replace(uav, loadlist=left)
+
+    def _at_place(self, uav: UAV, target: Target | None, clock: float, flown: float, aloft: float) -> UAV:
+        """Return the UAV at a target, or at its starting point."""
+        x, y = (uav.x_s, uav.y_s) if target is None else (target.x, target.y)
+        location = self._home if target is None else target.location
+        return replace(
+            uav, x_c=x, y_c=y, location=location, home_location=self._home, dis=flown, airborne=aloft,
+            available_from=clock, committed=uav.committed[len(self.begun) :],
+        )  # fmt: skip
+
+    def _on_way(self, leg: _Leg, flown: float, aloft: float, target: Target | None) -> UAV:
+        """Return the UAV on a leg, or waiting at its end."""
+        uav, at = self.uav if not self.begun else self._unloaded(), self._at
+        if leg.way is None:
+            clock = max(at, leg.arrival)
+            return self._at_place(uav, target, clock, flown + leg.air, aloft + clock - leg.takeoff)
+        if at >= leg.arrival:
+            # It is there in time, however long it waits.
+            late = target is not None and target.deadline is not None and target.deadline < at
+            clock = max(leg.arrival, target.deadline) if late and target and target.deadline else at
+            return self._at_place(uav, target, clock, flown + leg.air, aloft + clock - leg.takeoff)
+        x, y, air = _point_on(leg.way, at - leg.takeoff, self._problem.crs)
+        there = self._at_place(uav, target, at, flown + air, aloft + at - leg.takeoff)
+        return replace(there, x_c=x, y_c=y)
+
+    def _unloaded(self) -> UAV:
+        uav = self._problem.uavs[self._i]
+        for stop in self.begun:
+            uav = self._after(uav, stop)
+        return uav
+
+    def _leg(
+        self, takeoff: float, arrival: float, length: float, origin: Target | None, target: Target | None
+    ) -> _Leg:
+        if self._problem.matrices is not None:
+            return _Leg(takeoff, arrival, length, None)
+        uav = self._problem.uavs[self._i]
+        start = (uav.x_c, uav.y_c) if origin is None else (origin.x, origin.y)
+        end = (uav.x_s, uav.y_s) if target is None else (target.x, target.y)
+        way = _legs(self._problem, start, end).way(0, 1, uav.speed)
+        return _Leg(takeoff, arrival, length if way is None else float(way.air.sum()), way)
+
+
+def _legs(problem: Problem, start: tuple[float, float], end: tuple[float, float]) -> Legs:
+    zones = [np.array(zone.polygon, np.float64) for zone in problem.no_fly_zones]
+    wind = None if problem.wind is None else Wind(problem.wind.speed, problem.wind.towards)
+    return legs_between(problem.crs, np.array([start, end], np.float64), zones, wind)
+
+
+def _point_on(way: Way, elapsed: float, crs: str) -> tuple[float, float, float]:
+    """Return where a UAV is on a way after some time, and the air length that it has flown."""
+    air = 0.0
+    for piece, time in enumerate(way.time.tolist()):
+        if elapsed < time:
+            share = elapsed / time
+            x, y = _between(way.points[piece].tolist(), way.points[piece + 1].tolist(), share, crs)
+            return x, y, air + share * float(way.air[piece])
+        elapsed -= time
+        air += float(way.air[piece])
+    x, y = way.points[-1].tolist()
+    return x, y, air
+
+
+def _between(a: Sequence[float], b: Sequence[float], share: float, crs: str) -> tuple[float, float]:
+    """Return the point at a share of the straight line, or of the great circle, from a place to another."""
+    if crs == "local":
+        return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+    one, other = _on_sphere(a), _on_sphere(b)
+    angle = 2.0 * math.asin(min(1.0, math.dist(one, other) / 2.0))
+    if angle < 1e-12:
+        return (a[0], a[1]) if share < 0.5 else (b[0], b[1])
+    weights = math.sin((1.0 - share) * angle), math.sin(share * angle)
+    x, y, z = (weights[0] * p + weights[1] * q for p, q in zip(one, other, strict=True))
+    return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
+
+
+def _on_sphere(place: Sequence[float]) -> tuple[float, float, float]:
+    longitude, latitude = math.radians(place[0]), math.radians(place[1])
+    around = math.cos(latitude)
+    return around * math.cos(longitude), around * math.sin(longitude), math.sin(latitude)
