@@ -1,6 +1,5 @@
 """POST /evaluate: a plan of somebody's own."""
 
-import httpx
 import pytest
 
 UAVS = [
@@ -13,12 +12,6 @@ TARGETS = [
     {"x": 0.9, "y": 0.7, "level": 0.8, "loadlist": [4, 2]},
 ]
 PROBLEM = {"uavs": UAVS, "targets": TARGETS, "objective": {"distance_weight": 1.0}}
-
-
-@pytest.fixture
-def client(service_url):
-    with httpx.Client(base_url=service_url, timeout=120) as client:
-        yield client
 
 
 def test_a_plan_is_worth_what_its_allocation_says(client):
