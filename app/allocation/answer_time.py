@@ -83,14 +83,14 @@ class AnswerTime:
 
     def __init__(self) -> None:
         self.preparations = Preparations()
-        self._tracing: dict[str, deque[float]] = {}
+        self._tracing: dict[tuple[str, bool], deque[float]] = {}
         self._writing: deque[float] = deque(maxlen=_REMEMBERED)
         self._looking: deque[float] = deque(maxlen=_REMEMBERED)
         self._late: dict[tuple[str, str], deque[float]] = {}
 
     def traced(self, problem: Problem, size: AnswerSize, seconds: float) -> None:
         """Note how long it took to find out what a plan does, without the reasons for what it does not."""
-        last = self._tracing.setdefault(problem.objective.unloading, deque(maxlen=_REMEMBERED))
+        last = self._tracing.setdefault(_traced_as(problem), deque(maxlen=_REMEMBERED))
         last.append(seconds / _tracing_units(problem, size))
 
     def looked(self, problem: Problem, size: AnswerSize, seconds: float, finished: bool) -> None:
@@ -123,10 +123,11 @@ class AnswerTime:
     def tracing(self, problem: Problem, size: AnswerSize) -> float:
         """Return the seconds that it takes to find out what a plan does.
 
-        Where none with this problem's unloading was traced yet, those with the other one tell.
+        Where none like this problem was traced yet, those with the other unloading, or without zones, tell.
         """
-        last = self._tracing.get(problem.objective.unloading) or next(iter(self._tracing.values()), ())
-        return _median(last) * _tracing_units(problem, size)
+        unloading, _ = like = _traced_as(problem)
+        known = self._tracing.get(like) or self._tracing.get((unloading, False))
+        return _median(known or next(iter(self._tracing.values()), ())) * _tracing_units(problem, size)
 
     def looking(self, problem: Problem, size: AnswerSize, left_s: float) -> float:
         """Return the seconds to keep for the reasons of unmet needs, out of those that are left."""
@@ -152,6 +153,11 @@ class AnswerTime:
 
 def _median(numbers: Collection[float]) -> float:
     return median_high(numbers) if numbers else 0.0
+
+
+def _traced_as(problem: Problem) -> tuple[str, bool]:
+    """Return what makes tracing slower or quicker beside its size: the unloading, and ways round zones."""
+    return problem.objective.unloading, bool(problem.no_fly_zones)
 
 
 def _tracing_units(problem: Problem, size: AnswerSize) -> float:

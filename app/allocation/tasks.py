@@ -21,6 +21,7 @@ from app.domain.warnings import problem_warnings
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
+from app.simulation.evaluation import reward_of
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import Deadline
@@ -61,6 +62,9 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     if "run_time_limit_s" in payload:
         context.end_within(payload["run_time_limit_s"])
     problem = problem_from_record(payload["problem"])
+    if problem.start_plan:
+        # An illegal one is refused by name.
+        reward_of(problem, Plan(problem.start_plan))
     algorithm, known = payload["algorithm"], best_known(problem, payload)
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
     if limit.leaves_none_for(algorithm):

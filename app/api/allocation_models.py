@@ -82,14 +82,38 @@ class AnswerModel(BaseModel):
     model_config = ConfigDict(frozen=True)
 
 
+_PATH = "Points `[x, y]` flown over, first and last place included; null: a straight line"
+
+
 class StopModel(AnswerModel):
-    """One visit of a UAV."""
+    """One visit of a UAV; the last five only where the problem uses fields of the world, such as `wind`."""
 
     target_id: str = Field(description="The rescue area")
     step: int = Field(description="Decision step, from 1")
     arrival_time: float = Field(description="Time units from now, or h")
     distance: float = Field(description="Length of the leg flown to it")
     delivered: list[float] = Field(description="Amounts unloaded, one a material")
+    begin_time: float | None = Field(
+        default=None, description="When unloading begins: on arrival, or after waiting; as `arrival_time`"
+    )
+    departure_time: float | None = Field(default=None, description="When the visit has ended")
+    range_left: float | None = Field(
+        default=None, description="Air length left on departure, of the whole `voyage`"
+    )
+    endurance_left: float | None = Field(
+        default=None,
+        description="Time in the air left on departure, of the whole `endurance`; null: no limit",
+    )
+    path: list[tuple[float, float]] | None = Field(default=None, description=f"{_PATH} to it")
+
+
+class LandingModel(AnswerModel):
+    """The end of a route."""
+
+    time: float = Field(
+        description="When the UAV has landed; without `return_to_base`, when its last visit has ended"
+    )
+    path: list[tuple[float, float]] | None = Field(description=f"{_PATH} home")
 
 
 class RouteModel(AnswerModel):
@@ -99,6 +123,11 @@ class RouteModel(AnswerModel):
     distance: float = Field(description="Distance of the legs to its stops, without the leg home")
     return_distance: float = Field(description="Length of the leg home")
     stops: list[StopModel] = Field(description="Its visits")
+    landing: LandingModel | None = Field(
+        default=None,
+        description="Its end; null for a UAV that does not fly. Only where the problem uses fields of the "
+        "world",
+    )
 
 
 class LaterDeadlineModel(AnswerModel):
@@ -202,7 +231,10 @@ class Allocation(AnswerModel):
     assignment: list[list[int]] = Field(
         description="One joint action a step: for each UAV the index of its target, or N for home"
     )
-    reward: float = Field(description="satisfaction - distance_weight · distance")
+    reward: float = Field(
+        description="satisfaction - distance_weight · distance - makespan_weight · makespan - change_weight "
+        "· changes"
+    )
     satisfaction: float = Field(description="Sum over the visits of level · delivered / requested")
     distance: float = Field(description="Total distance, legs home only if they are charged")
     distance_weight: float = Field(description="λ as it was used")
@@ -233,4 +265,18 @@ class Allocation(AnswerModel):
     )
     source_policy: SourcePolicyModel | None = Field(description="What was transferred, if anything")
     history: HistoryModel = Field(description="Reward against epoch; thinned evenly beyond 10,000")
+    makespan: float | None = Field(
+        default=None,
+        description="When the last UAV with a visit has landed; 0 without visits. Only where the problem "
+        "uses fields of the world",
+    )
+    changes: int | None = Field(
+        default=None,
+        description="Pairs of UAV and area that are visited in `start_plan` and not in the plan. Only where "
+        "the problem uses fields of the world",
+    )
     elapsed_s: float = Field(description="Seconds from the request's arrival to the plan")
+
+
+SOMETIMES_ANSWERED = frozenset({"makespan", "changes"})
+"""Fields of an allocation that are left out where the problem uses no field of the world."""

@@ -74,6 +74,8 @@ def answer_of(job: Job, blamed: str | None = None) -> dict[str, Any]:
 def written_answer_of(job: Job, fields: Mapping[str, Any]) -> str:
     """Return the same as JSON, with the defaults of fields that an earlier version did not answer.
 
+    Fields of the answer that have no default here are kept.
+
     Raises
     ------
     JobFailed, JobCancelled, Draining
@@ -85,7 +87,7 @@ def written_answer_of(job: Job, fields: Mapping[str, Any]) -> str:
         assert text is not None
         return text
     answer = answer_of(job)
-    return write({name: answer.get(name, default) for name, default in fields.items()})
+    return write({name: answer.get(name, default) for name, default in fields.items()} | answer)
 
 
 def _require_result(job: Job, blamed: str | None) -> None:

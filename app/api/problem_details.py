@@ -31,6 +31,7 @@ STATUS_OF_CODE: Mapping[str, HTTPStatus] = {
     "invalid-cursor": HTTPStatus.UNPROCESSABLE_ENTITY,
     # app.domain.errors
     "invalid-problem": HTTPStatus.UNPROCESSABLE_ENTITY,
+    "illegal-plan": HTTPStatus.UNPROCESSABLE_ENTITY,
     "unknown-algorithm": HTTPStatus.UNPROCESSABLE_ENTITY,
     "invalid-parameters": HTTPStatus.UNPROCESSABLE_ENTITY,
     "problem-too-large": HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -78,6 +79,7 @@ MEANINGS: Mapping[str, str] = {
     "invalid-request": "Fields or parameters are missing, unknown, of another type or out of range",
     "invalid-cursor": "No page has given this cursor out",
     "invalid-problem": "The problem breaks a rule between its fields",
+    "illegal-plan": "The plan that was sent breaks a rule of the problem",
     "unknown-algorithm": "No algorithm has this name",
     "invalid-parameters": "The algorithm has no such parameters, or not with these values",
     "problem-too-large": "The problem is larger than the operator or the algorithm takes",

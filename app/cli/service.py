@@ -122,7 +122,8 @@ def allocate(
             context = WorkContext.in_process(report, time_limit_s=request.time_limit_s)
             result = tasks.allocate(payload, context).result
     answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
-    sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}) + "\n")
+    written = answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True)
+    sys.stdout.write(written + "\n")
 
 
 def compile_code(

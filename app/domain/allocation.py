@@ -1,4 +1,9 @@
-"""The answer to a problem: a plan with what it earns, its routes, and what stays unmet."""
+"""The answer to a problem: a plan with what it earns, its routes, and what stays unmet.
+
+What only the world of a problem gives a meaning to (waiting, zones, wind, endurance, … : see
+:func:`app.domain.world_use.uses_world`) is in classes of its own, so that an answer to a problem without any
+of it does not have it.
+"""
 
 from __future__ import annotations
 
@@ -55,12 +60,78 @@ class Route:
     stops: tuple[Stop, ...]
 
 
+Path = tuple[tuple[float, float], ...]
+"""Points flown over, the first and the last place among them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimedStop(Stop):
+    """A visit in a world with more than places.
+
+    Attributes
+    ----------
+    begin_time
+        When unloading begins: on arrival, or after waiting.
+    departure_time
+        When the visit has ended.
+    range_left
+        Air length left on departure, of the whole ``voyage``.
+    endurance_left
+        Time in the air left on departure, of the whole ``endurance``; None where there is no limit.
+    path
+        Points flown over on the way to it; None where that is a straight line.
+    """
+
+    begin_time: float
+    departure_time: float
+    range_left: float
+    endurance_left: float | None
+    path: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class Landing:
+    """The end of a route.
+
+    Attributes
+    ----------
+    time
+        When the UAV has landed; where it need not return, when its last visit has ended.
+    path
+        Points flown over on the way home; None where that is a straight line, or it need not return.
+    """
+
+    time: float
+    path: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class LandingRoute(Route):
+    """A route in a world with more than places.
+
+    Attributes
+    ----------
+    landing
+        Its end; None for a UAV that does not fly.
+    """
+
+    landing: Landing | None
+
+
 class UnmetCode(StrEnum):
     """Why a rescue area does not get all it needs, from what no plan could change to what another would."""
 
     NO_SUPPLY = "no_supply"
+    SKILLS = "skills"
+    EXCLUDED = "excluded"
+    NO_FLY_ZONE = "no_fly_zone"
+    WIND = "wind"
     OUT_OF_RANGE = "out_of_range"
     DEADLINE = "deadline"
+    ENDURANCE = "endurance"
+    TOO_EARLY_TO_WAIT = "too_early_to_wait"
+    AVAILABLE_UNTIL = "available_until"
+    COMMITTED = "committed"
     STEP_LIMIT = "step_limit"
     RANGE_USED = "range_used"
     TIME_USED = "time_used"
@@ -76,8 +147,16 @@ class UnmetCode(StrEnum):
 
 _MEANINGS = {
     UnmetCode.NO_SUPPLY: "No UAV that can be sent carries any of what it still needs.",
+    UnmetCode.SKILLS: "No UAV that carries any of it has all the skills that the area asks for.",
+    UnmetCode.EXCLUDED: "Every UAV that carries any of it must not be sent there.",
+    UnmetCode.NO_FLY_ZONE: "No way leads there, or home from there, round the no-fly zones.",
+    UnmetCode.WIND: "The wind is too strong to fly there, or home from there.",
     UnmetCode.OUT_OF_RANGE: "No UAV that carries any of it has the range to fly there, not even directly.",
     UnmetCode.DEADLINE: "No UAV with any of it and the range is there in time, not even directly.",
+    UnmetCode.ENDURANCE: "A UAV that could bring some of it would be in the air for too long.",
+    UnmetCode.TOO_EARLY_TO_WAIT: "A UAV that could bring some of it cannot wait in the air until it opens.",
+    UnmetCode.AVAILABLE_UNTIL: "A UAV that could bring some of it would land too late.",
+    UnmetCode.COMMITTED: "The UAVs that could bring some of it are committed to other visits first.",
     UnmetCode.STEP_LIMIT: "A UAV has some of it left over and lacks only a decision step for one more visit.",
     UnmetCode.RANGE_USED: "A UAV has some of it left over, but its other visits leave it too little range.",
     UnmetCode.TIME_USED: "A UAV has some of it left over, but its other visits leave too little time.",
@@ -173,8 +252,8 @@ class Unmet:
 class Allocation:
     """A plan and everything that follows from it by the rules of the specification.
 
-    ``reward = satisfaction - distance_weight * distance``; ``distance`` has the legs home only where the
-    objective charges for them.
+    ``reward = satisfaction - distance_weight * distance``, less what makespan and changes cost where the
+    objective says so; ``distance`` has the legs home only where the objective charges for them.
     """
 
     plan: Plan
@@ -184,3 +263,19 @@ class Allocation:
     distance_weight: float
     routes: tuple[Route, ...]
     unmet: tuple[Unmet, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TimedAllocation(Allocation):
+    """An allocation in a world with more than places; reward is lost for the makespan and for changes too.
+
+    Attributes
+    ----------
+    makespan
+        When the last UAV with a visit has landed; 0 without visits.
+    changes
+        Pairs of UAV and area that are visited in ``start_plan`` and not in the plan.
+    """
+
+    makespan: float
+    changes: int

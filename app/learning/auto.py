@@ -14,7 +14,6 @@ from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.evaluation import rewards_of
 from app.simulation.simulator import new_episodes
 from app.simulation.visit import ALLOWED
-from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import Search, actions_of, new_search, set_routes
 from app.solvers.local_search.solver import how_long, search_on, watching
 from app.solvers.parameters import AutoParameters
@@ -27,6 +26,7 @@ from app.solvers.protocol import (
     SourcePolicy,
     StopCriterion,
 )
+from app.solvers.start import begin_search
 from app.solvers.stop import share_of_time
 
 _WORK_A_SECOND = 2e7
@@ -65,7 +65,7 @@ class Auto:
         arrays = compile_problem(problem)
         given = self._parameters
         search, history = new_search(arrays), History()
-        set_routes(search, greedy_plan(problem, stop).as_array())
+        begin_search(search, problem, stop)
         moves, restarts = how_long(search, given.moves, given.restarts, stop)
         policy = policy_pays(arrays, stop.seconds_left()) if given.policy is None else given.policy
         source = None

@@ -100,12 +100,12 @@ class _Model(NamedTuple):
 def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Model:
     m, n, k = arrays.shape
     per_distance = _RESOLUTION / max(problem.extent, 1e-9)
-    per_time = per_distance * float(arrays.speed.mean())
+    per_time = per_distance * float(arrays.uavs["speed"].mean())
     amounts = 1000 if max(arrays.load.max(), arrays.need.max()) < 1e6 else 1
     like = alike(arrays).tolist()
     distance, duration, charged = {}, {}, {}
     service = np.zeros((n + 2 * m, n + 2 * m))
-    service[:, :n] = arrays.service[0]
+    service[:, :n] = arrays.areas["service"][0]
     np.fill_diagonal(service, 0.0)
     for i in set(like):
         legs = np.zeros((n + 2 * m, n + 2 * m))
@@ -114,11 +114,13 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
         home = legs.copy()
         home[:n, n + m + i] = arrays.home[0, i]
         distance[i] = np.ceil(per_distance * (home if problem.objective.return_to_base else legs))
-        duration[i] = np.ceil(per_time * (legs / arrays.speed[0, i] + service))
+        duration[i] = np.ceil(per_time * (legs / arrays.uavs["speed"][0, i] + service))
         charged[i] = home if problem.objective.charge_return else legs
-    latest = np.where(np.isfinite(arrays.deadline[0]), arrays.deadline[0] * per_time, _UNLIMITED)
-    total = arrays.need_total[0]
-    worth = [j for j in range(n) if total[j] > 0 and arrays.level[0, j] > 0 and latest[j] >= 0]
+    latest = np.where(
+        np.isfinite(arrays.areas["deadline"][0]), arrays.areas["deadline"][0] * per_time, _UNLIMITED
+    )
+    total = arrays.areas["need_total"][0]
+    worth = [j for j in range(n) if total[j] > 0 and arrays.areas["level"][0, j] > 0 and latest[j] >= 0]
     need = np.ceil(amounts * arrays.need[0] - 1e-9)
     clients, needs = worth, need[worth]
     if by_material:
@@ -132,9 +134,9 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
         distance=distance,
         duration=duration,
         charged=charged,
-        longest=np.maximum(0, np.floor(per_distance * (arrays.voyage[0] - arrays.dis[0]))),
-        latest=np.floor(latest + np.ceil(per_time * arrays.service[0])),
-        prize=arrays.level[0][clients] * share,
+        longest=np.maximum(0, np.floor(per_distance * (arrays.uavs["voyage"][0] - arrays.uavs["dis"][0]))),
+        latest=np.floor(latest + np.ceil(per_time * arrays.areas["service"][0])),
+        prize=arrays.areas["level"][0][clients] * share,
         share=share,
         load=np.floor(amounts * arrays.load[0] + 1e-9),
         need=needs,
@@ -193,10 +195,10 @@ def _pyvrp_routes(
     from pyvrp.stop import MaxRuntime  # noqa: PLC0415 - an extra
 
     m, n, _ = arrays.shape
-    weight, speeds = float(arrays.weight[0]), arrays.speed[0]
+    weight, speeds = float(arrays.terms["weight"][0]), arrays.uavs["speed"][0]
     per_distance = _RESOLUTION / max(problem.extent, 1e-9)
     # Prizes must not be worth more than the penalties, of 1e5 a unit at most, that keep routes feasible.
-    scale = 1e7 / max(float(arrays.level.max()), 1e-12)
+    scale = 1e7 / max(float(arrays.areas["level"].max()), 1e-12)
     unit = {i: weight * speeds[i] / speeds.mean() / per_distance for i in model.distance}
     members = {
         i: [q for q in range(m) if model.like[q] == i and not problem.uavs[q].ret] for i in model.distance
@@ -211,7 +213,7 @@ def _pyvrp_routes(
         ).astype(np.int64)
         for i in types
     ]
-    refund = weight * float(speeds.mean()) * arrays.service[0][model.clients] * model.share
+    refund = weight * float(speeds.mean()) * arrays.areas["service"][0][model.clients] * model.share
     locations = [pyvrp.Location(0, 0) for _ in range(n + 2 * m)]
     depots = [pyvrp.Depot(n + q) for q in range(2 * m)]
     clients = [
@@ -282,7 +284,7 @@ def _routing_routes(
     )
     model_ = pywrapcp.RoutingModel(manager)
     chosen = np.ix_(nodes, nodes)
-    weight = float(arrays.weight[0])
+    weight = float(arrays.terms["weight"][0])
 
     def registered(matrix: Floats) -> int:
         return int(model_.RegisterTransitMatrix(np.rint(matrix).astype(np.int64).tolist()))

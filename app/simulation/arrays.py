@@ -14,14 +14,18 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.recfunctions import structured_to_unstructured
 
-from app.domain.geometry import distance
 from app.domain.problem import ROUNDING, Problem
-from app.simulation.distances import between_points
+from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
+Records = npt.NDArray[np.void]
+
+NONE = -1
+"""In place of a target in a list: there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,74 +35,174 @@ class Axes:
     Attributes
     ----------
     names
-        A letter each: M (UAVs), N (targets), K (materials), in this order, but for NN.
+        A letter each: M (UAVs), N (targets), C (classes of legs), and X, the last, for what else there is.
     padding
         What a padded UAV or target has.
     """
 
     names: str = ""
-    padding: float = 0.0
+    padding: Any = 0.0
+
+
+TERMS = np.dtype(
+    [
+        ("weight", "f8"),
+        ("decay", "f8"),
+        ("bonus", "f8"),
+        ("makespan", "f8"),
+        ("change", "f8"),
+        ("crumb", "f8"),
+        ("return_to_base", "?"),
+        ("charge_return", "?"),
+        ("timed", "?"),
+        ("in_wind", "?"),
+        ("metric", "?"),
+    ],
+    align=True,
+)
+"""What holds for a whole problem.
+
+weight, makespan, change
+    Distance weight λ as it is used, and the weights of makespan and changes.
+decay
+    1 / half_life, 0 where nothing decays.
+bonus
+    What the first share of a need earns above the rest, minimum_weight - 1; 0 where there is none.
+crumb
+    Amount below which what is left of another one may be rounding: that share of the largest.
+return_to_base, charge_return
+    The objective's switches.
+timed
+    Whether times of legs are given; otherwise they are lengths over speeds.
+in_wind
+    Whether the air length of a leg is time · speed, not the length over ground.
+metric
+    Whether no way over a third place is shorter, or takes less time, than the leg itself.
+"""
+
+UAVS = np.dtype(
+    [
+        ("speed", "f8"),
+        ("voyage", "f8"),
+        ("dis", "f8"),
+        ("ready", "f8"),
+        ("until", "f8"),
+        ("airborne", "f8"),
+        ("endurance", "f8"),
+        ("start_home", "f8"),
+        ("start_home_time", "f8"),
+        ("leg_class", "i8"),
+        ("watched", "?"),
+        ("on_ground", "?"),
+    ],
+    align=True,
+)
+"""What a UAV has.
+
+speed, dis
+    As in the request.
+voyage, endurance
+    Range, and time that it may be in the air, without what has to be left after landing; the latter is
+    infinite where there is no limit.
+ready, until
+    Its clock at the start, and the latest time to have landed; infinite where there is none.
+airborne
+    Time in the air at the start.
+start_home, start_home_time
+    Length of the leg from its current position to its starting point, 0 where there is none, and its time
+    where times are given.
+leg_class
+    Class of its legs.
+watched
+    Whether ``until`` or ``endurance`` is a limit.
+on_ground
+    Whether it waits for its first visit on the ground.
+"""
+
+AREAS = np.dtype(
+    [
+        ("level", "f8"),
+        ("unit", "f8"),
+        ("need_total", "f8"),
+        ("earliest", "f8"),
+        ("deadline", "f8"),
+        ("service", "f8"),
+    ],
+    align=True,
+)
+"""What holds for a target.
+
+level
+    What meeting the whole need at once earns: the emergency level, times the share of what was requested
+    that is still needed, and what the first share earns above.
+unit
+    What a unit of material beyond the first share earns.
+need_total
+    Sum of the needs over materials; 0 for a target that needs nothing.
+earliest, deadline, service
+    As in the request; the deadline is infinite where there is none.
+"""
 
 
 class ProblemArrays(NamedTuple):
     """A stack of P problems of one (padded) shape M, N, K.
 
+    Legs are of C classes (:mod:`app.simulation.legs`); one that does not exist is ``UNREACHABLE`` long.
+    Where times of legs are lengths over speeds, the arrays of times have no columns.
+
     Attributes
     ----------
     start_target
-        (P, M, N) distance from a UAV's current position in the request to a target.
+        (P, M, N) length of the leg from a UAV's current position in the request to a target.
     between
-        (P, N, N) distance between targets.
+        (P, C, N, N) length of the leg from a target to another.
     home
-        (P, M, N) distance from a target to a UAV's starting point.
-    start_home
-        (P, M) distance from a UAV's current position in the request to its starting point.
-    speed, voyage, dis
-        (P, M) as in the request.
+        (P, M, N) length of the leg from a target to a UAV's starting point; 0 where there is none.
+    start_time, between_time, home_time
+        (P, M, N), (P, C, N, N), (P, M, N) times of these legs, where they are given.
+    kept_range
+        (P, M, N) air length that has to be left on arrival at a target: that of the way home, where it is
+        required; ``UNREACHABLE`` where the UAV must not be sent there.
+    uavs
+        (P, M) of :data:`UAVS`.
+    committed, before
+        (P, M, V) targets that a UAV visits first, in this order, and (P, M, W) those that it visits in
+        ``start_plan``, each once, where changes cost reward; ``NONE`` after the last.
     ret
         (P, M) UAVs that are returning.
     load
         (P, M, K) amounts carried.
+    areas
+        (P, N) of :data:`AREAS`.
     need
         (P, N, K) amounts needed.
     requested
         (P, N, K) amounts that the needs are a part of; the needs, where the request says nothing else.
-    crumb
-        (P,) amount below which what is left of another one may be rounding: that share of the largest.
-    need_total
-        (P, N) sum of the needs over materials; 0 for a target that needs nothing.
-    level
-        (P, N) what meeting the whole need earns: the emergency level, times the share of what was requested
-        that is still needed.
-    deadline, service
-        (P, N); deadline is infinite where there is none.
-    weight
-        (P,) distance weight λ as it is used.
-    return_to_base, charge_return
-        (P,) the objective's switches.
+    beyond
+        (P, N, K) amounts of the needs beyond the first share: a need above it is partly of the first share.
+    terms
+        (P,) of :data:`TERMS`.
     max_steps
         (P,) S.
     """
 
     start_target: Annotated[Floats, Axes("MN")]
-    between: Annotated[Floats, Axes("NN")]
+    between: Annotated[Floats, Axes("CNN")]
     home: Annotated[Floats, Axes("MN")]
-    start_home: Annotated[Floats, Axes("M")]
-    speed: Annotated[Floats, Axes("M", padding=1.0)]
-    voyage: Annotated[Floats, Axes("M")]
-    dis: Annotated[Floats, Axes("M")]
+    start_time: Annotated[Floats, Axes("MN")]
+    between_time: Annotated[Floats, Axes("CNN")]
+    home_time: Annotated[Floats, Axes("MN")]
+    kept_range: Annotated[Floats, Axes("MN")]
+    uavs: Annotated[Records, Axes("M", padding=(1.0, *(0.0,) * 8, 0, False, False))]
+    committed: Annotated[Integers, Axes("MX", padding=-1)]
+    before: Annotated[Integers, Axes("MX", padding=-1)]
     ret: Annotated[Flags, Axes("M", padding=True)]
-    load: Annotated[Floats, Axes("MK")]
-    need: Annotated[Floats, Axes("NK")]
-    requested: Annotated[Floats, Axes("NK")]
-    crumb: Annotated[Floats, Axes()]
-    need_total: Annotated[Floats, Axes("N")]
-    level: Annotated[Floats, Axes("N")]
-    deadline: Annotated[Floats, Axes("N", padding=np.inf)]
-    service: Annotated[Floats, Axes("N")]
-    weight: Annotated[Floats, Axes()]
-    return_to_base: Annotated[Flags, Axes()]
-    charge_return: Annotated[Flags, Axes()]
+    load: Annotated[Floats, Axes("MX")]
+    areas: Annotated[Records, Axes("N", padding=(0.0, 0.0, 0.0, 0.0, np.inf, 0.0))]
+    need: Annotated[Floats, Axes("NX")]
+    requested: Annotated[Floats, Axes("NX")]
+    beyond: Annotated[Floats, Axes("NX")]
+    terms: Annotated[Records, Axes()]
     max_steps: Annotated[Integers, Axes()]
 
     @property
@@ -134,44 +238,110 @@ def _forget(gone: weakref.ref[Problem]) -> None:
 
 
 def _compile(problem: Problem) -> ProblemArrays:
-    uavs, targets = problem.uavs, problem.targets
-    start = np.array([(u.x_s, u.y_s) for u in uavs], dtype=np.float64)
-    current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
-    area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
+    uavs, targets, objective = problem.uavs, problem.targets, problem.objective
     need = np.array([t.need for t in targets], dtype=np.float64)
     load = np.array([u.loadlist for u in uavs], dtype=np.float64)
     requested = np.array(
         [t.loadlist if t.requested is None else t.requested for t in targets], dtype=np.float64
     )
-    start_target = between_points(problem.crs, current, area)
-    # Most swarms are where they start, and have the same way to a target as home from it.
-    home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, area)
+    share = objective.minimum_share if objective.minimum_weight > 1.0 else 0.0
+    bonus = objective.minimum_weight - 1.0 if share > 0.0 else 0.0
+    beyond = (1.0 - share) * requested
+    legs = leg_arrays(problem)
+    index = {target.id: j for j, target in enumerate(targets)}
+    terms = np.zeros(1, TERMS)
+    terms["weight"], terms["makespan"] = problem.distance_weight, objective.makespan_weight
+    terms["change"], terms["bonus"] = objective.change_weight, bonus
+    terms["decay"] = 0.0 if objective.half_life is None else 1.0 / objective.half_life
+    terms["crumb"] = ROUNDING * max(load.max(), requested.max())
+    terms["return_to_base"], terms["charge_return"] = objective.return_to_base, objective.charge_return
+    terms["timed"], terms["in_wind"], terms["metric"] = legs.timed, legs.in_wind, legs.metric
     return ProblemArrays(
-        start_target=start_target[None],
-        between=between_points(problem.crs, area, area)[None],
-        home=home[None],
-        start_home=np.array(
-            [[distance(problem.crs, u.x_c, u.y_c, u.x_s, u.y_s) for u in uavs]], dtype=np.float64
-        ),
-        speed=np.array([[u.speed for u in uavs]], dtype=np.float64),
-        voyage=np.array([[u.voyage for u in uavs]], dtype=np.float64),
-        dis=np.array([[u.dis for u in uavs]], dtype=np.float64),
+        start_target=legs.start_target[None],
+        between=legs.between[None],
+        home=legs.home[None],
+        start_time=legs.start_time[None],
+        between_time=legs.between_time[None],
+        home_time=legs.home_time[None],
+        kept_range=_kept_range(problem, legs, index)[None],
+        uavs=_uavs(problem, legs)[None],
+        committed=_listed([[index[each] for each in u.committed] for u in uavs])[None],
+        before=_listed(_visited_before(problem))[None],
         ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
         load=load[None],
+        areas=_areas(problem, need, beyond, bonus)[None],
         need=need[None],
         requested=requested[None],
-        crumb=np.array([ROUNDING * max(load.max(), requested.max())]),
-        need_total=need.sum(axis=1)[None],
-        level=np.array([[t.urgency for t in targets]], dtype=np.float64),
-        deadline=np.array(
-            [[np.inf if t.deadline is None else t.deadline for t in targets]], dtype=np.float64
-        ),
-        service=np.array([[t.service_time for t in targets]], dtype=np.float64),
-        weight=np.array([problem.distance_weight], dtype=np.float64),
-        return_to_base=np.array([problem.objective.return_to_base], dtype=np.bool_),
-        charge_return=np.array([problem.objective.charge_return], dtype=np.bool_),
+        beyond=beyond[None],
+        terms=terms,
         max_steps=np.array([problem.max_steps], dtype=np.int64),
     )
+
+
+def _uavs(problem: Problem, legs: LegArrays) -> Records:
+    columns = np.zeros(problem.n_uavs, UAVS)
+    uavs = problem.uavs
+    columns["speed"], columns["dis"] = [u.speed for u in uavs], [u.dis for u in uavs]
+    columns["voyage"] = [u.voyage * (1.0 - u.reserve) for u in uavs]
+    columns["ready"], columns["airborne"] = [u.available_from for u in uavs], [u.airborne for u in uavs]
+    columns["until"] = [np.inf if u.available_until is None else u.available_until for u in uavs]
+    columns["endurance"] = [np.inf if u.endurance is None else u.endurance * (1.0 - u.reserve) for u in uavs]
+    columns["watched"] = np.isfinite(columns["until"]) | np.isfinite(columns["endurance"])
+    columns["on_ground"] = [
+        (u.x_c, u.y_c) == (u.x_s, u.y_s)
+        and u.home_location in (None, u.location)
+        and u.dis == 0.0
+        and u.airborne == 0.0
+        for u in uavs
+    ]
+    columns["start_home"], columns["start_home_time"] = legs.start_home, legs.start_home_time
+    columns["leg_class"] = legs.leg_class
+    return columns
+
+
+def _areas(problem: Problem, need: Floats, beyond: Floats, bonus: float) -> Records:
+    columns, total = np.zeros(problem.n_targets, AREAS), need.sum(axis=1)
+    level = np.array([t.urgency for t in problem.targets], dtype=np.float64)
+    unit = np.where(total > 0.0, level / np.where(total > 0.0, total, 1.0), 0.0)
+    if bonus > 0.0:
+        level = level + bonus * unit * np.maximum(0.0, need - beyond).sum(axis=1)
+    columns["level"], columns["unit"], columns["need_total"] = level, unit, total
+    columns["earliest"] = [t.earliest for t in problem.targets]
+    columns["deadline"] = [np.inf if t.deadline is None else t.deadline for t in problem.targets]
+    columns["service"] = [t.service_time for t in problem.targets]
+    return columns
+
+
+def _kept_range(problem: Problem, legs: LegArrays, index: dict[str, int]) -> Floats:
+    """Return the air lengths that have to be left on arrival, (M, N)."""
+    kept = np.zeros(legs.home.shape)
+    if problem.objective.return_to_base:
+        speed = np.array([uav.speed for uav in problem.uavs])[:, None]
+        kept[:] = np.where(legs.homeless, UNREACHABLE, legs.home_time * speed if legs.in_wind else legs.home)
+    skills = [frozenset(target.skills) for target in problem.targets]
+    skilled = np.array([bool(needed) for needed in skills])
+    for i, uav in enumerate(problem.uavs):
+        kept[i, [index[each] for each in uav.excluded]] = UNREACHABLE
+        for j in np.flatnonzero(skilled):
+            if not skills[j] <= frozenset(uav.skills):
+                kept[i, j] = UNREACHABLE
+    return kept
+
+
+def _visited_before(problem: Problem) -> list[list[int]]:
+    """Return for each UAV the targets that it visits in ``start_plan``, where changes cost reward."""
+    if not problem.start_plan or problem.objective.change_weight == 0.0:
+        return [[] for _ in problem.uavs]
+    columns = zip(*problem.start_plan, strict=True)
+    return [list(dict.fromkeys(j for j in column if j < problem.n_targets)) for column in columns]
+
+
+def _listed(lists: list[list[int]]) -> Integers:
+    """Return lists as rows that end in ``NONE``; (R, 0) where all are empty."""
+    longest = max(map(len, lists))
+    return np.array([row + [NONE] * (longest + 1 - len(row)) for row in lists], np.int64)[
+        :, : longest + 1 if longest else 0
+    ]
 
 
 def _axes() -> dict[str, Axes]:
@@ -196,23 +366,56 @@ def part(arrays: ProblemArrays, uavs: Integers, targets: Integers) -> ProblemArr
     uavs, targets
         (P, M) and (P, N): those that each part has, in their order there.
     """
-    taken = {"M": uavs, "N": targets}
+    # A part has as many classes of legs as there may be among its UAVs, numbered anew.
+    classes, number = _classes_of(arrays.uavs["leg_class"][0][uavs])
+    taken = {"M": uavs, "N": targets, "C": classes}
     columns = {}
     for name, axes in AXES.items():
         column = getattr(arrays, name)
-        some = [taken[axis] for axis in axes.names if axis != "K"]
-        if len(some) == 2:
-            column = column[0][some[0][:, :, None], some[1][:, None, :]]
-        else:
-            column = column[0][some[0]] if some else np.repeat(column[:1], len(uavs))
+        some = [taken[axis] for axis in axes.names if axis != "X"]
+        if column.size == 0:
+            shape = [each.shape[1] if size else 0 for each, size in zip(some, column.shape[1:], strict=False)]
+            columns[name] = np.empty((len(uavs), *shape, *column.shape[1 + len(some) :]), column.dtype)
+            continue
+        for axis in range(len(some)):
+            some[axis] = some[axis].reshape(
+                len(uavs), *(-1 if each == axis else 1 for each in range(len(some)))
+            )
+        column = column[0][tuple(some)] if some else np.repeat(column[:1], len(uavs), axis=0)
         # Compiled code is made anew for every order of memory, and nobody should wait for that.
         columns[name] = np.ascontiguousarray(column)
+    columns["uavs"]["leg_class"] = number
+    columns["committed"], columns["before"] = (
+        _numbered_anew(columns[name], targets, arrays.shape[1]) for name in ("committed", "before")
+    )
     return ProblemArrays(**columns)
+
+
+def _classes_of(given: Integers) -> tuple[Integers, Integers]:
+    """Return the classes (P, C) among UAVs of classes (P, M), and each UAV's place among them."""
+    number, found = np.empty_like(given), []
+    for place, row in enumerate(given):
+        classes, number[place] = np.unique(row, return_inverse=True)
+        found.append(classes)
+    most = max(map(len, found))
+    return np.array([np.resize(classes, most) for classes in found], np.int64), number
+
+
+def _numbered_anew(listed: Integers, targets: Integers, n: int) -> Integers:
+    """Return lists of targets (P, M, X) by their places in each part; N of a part stands for others."""
+    places = np.full((len(targets), n + 1), targets.shape[1], np.int64)
+    np.put_along_axis(places, targets, np.arange(targets.shape[1])[None, :], axis=1)
+    places[:, n] = NONE
+    return np.take_along_axis(
+        places, np.where(listed == NONE, n, listed).reshape(len(places), -1), axis=1
+    ).reshape(listed.shape)
 
 
 def alike(arrays: ProblemArrays) -> Integers:
     """Return for each UAV of a stack's first problem the first one that is like it in everything, (M,)."""
-    told = np.column_stack([getattr(arrays, name)[0] for name in OF_UAVS])
+    columns = [getattr(arrays, name)[0] for name in OF_UAVS]
+    plain = [structured_to_unstructured(each) if each.dtype.names else each for each in columns]
+    told = np.column_stack([each.reshape(len(each), -1) for each in plain])
     first: dict[bytes, int] = {}
     # Adding 0 makes one zero of the two.
     return np.array([first.setdefault(row.tobytes(), i) for i, row in enumerate(told + 0.0)], np.int64)
@@ -232,10 +435,11 @@ def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
     return ProblemArrays(**{name: _pad(arrays, AXES[name].padding) for name, arrays in columns})
 
 
-def _pad(arrays: Sequence[npt.NDArray[Any]], value: float) -> npt.NDArray[Any]:
+def _pad(arrays: Sequence[npt.NDArray[Any]], value: Any) -> npt.NDArray[Any]:
     largest = [max(sizes) for sizes in zip(*(a.shape[1:] for a in arrays), strict=True)]
     total = sum(len(a) for a in arrays)
-    padded = np.full((total, *largest), value, dtype=arrays[0].dtype)
+    padded = np.empty((total, *largest), dtype=arrays[0].dtype)
+    padded[...] = np.array(value, dtype=arrays[0].dtype)
     row = 0
     for a in arrays:
         padded[(slice(row, row + len(a)), *(slice(size) for size in a.shape[1:]))] = a

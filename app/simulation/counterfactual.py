@@ -58,8 +58,8 @@ class Counterfactuals:
         self._given, self._plan, self._trial, self._planned = arrays, plan, trial, planned
         # Copies of what a relaxation may change.
         self._arrays = arrays._replace(
-            voyage=arrays.voyage.copy(),
-            deadline=arrays.deadline.copy(),
+            uavs=arrays.uavs.copy(),
+            areas=arrays.areas.copy(),
             load=arrays.load.copy(),
             max_steps=arrays.max_steps.copy(),
         )
@@ -70,18 +70,18 @@ class Counterfactuals:
         reloaded = relaxation is not None and any(relaxation.more_load)
         if relaxation is not None:
             arrays.load[0, i] += relaxation.more_load
-            arrays.voyage[0, i] += relaxation.more_range
+            arrays.uavs["voyage"][0, i] += relaxation.more_range
             arrays.max_steps[0] += relaxation.more_steps
             for later in relaxation.later_deadlines:
-                arrays.deadline[0, self._index[later.target_id]] += later.by
+                arrays.areas["deadline"][0, self._index[later.target_id]] += later.by
         outcome = self._fly(i, place, j, reloaded)
         if relaxation is not None:
             arrays.load[0, i] = given.load[0, i]
-            arrays.voyage[0, i] = given.voyage[0, i]
+            arrays.uavs["voyage"][0, i] = given.uavs["voyage"][0, i]
             arrays.max_steps[0] = given.max_steps[0]
             for later in relaxation.later_deadlines:
                 x = self._index[later.target_id]
-                arrays.deadline[0, x] = given.deadline[0, x]
+                arrays.areas["deadline"][0, x] = given.areas["deadline"][0, x]
         return outcome
 
     def _fly(self, i: int, place: int, j: int, reloaded: bool) -> Outcome:

@@ -15,12 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import ROUNDING
-from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.simulation.visit import worths
-
-NONE = -1
-"""End of a linked list, and of a path."""
 
 
 class Visits(NamedTuple):

@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from app.domain.allocation import Allocation, Route, Stop
+from app.domain.allocation import (
+    Allocation,
+    Landing,
+    LandingRoute,
+    Route,
+    Stop,
+    TimedAllocation,
+    TimedStop,
+)
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation import simulator
+from app.domain.world_use import uses_world
+from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.evaluation import replayed
 from app.simulation.unmet import unmet_targets
+from app.simulation.ways import Ways
 
 
 def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: False) -> Allocation:
     """Replay a plan and write down everything that follows from it.
+
+    The answer is a :class:`~app.domain.allocation.TimedAllocation` where the problem uses anything of the
+    world (:func:`~app.domain.world_use.uses_world`).
 
     With planned unloading the deliveries are the best ones for the plan's routes.
 
@@ -41,63 +56,158 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     # Nobody is sent home in this replay: at its end every UAV is still at its last stop, which is where the
     # leg home begins and where one more visit would begin.
     episodes = simulator.new_episodes(arrays, 1)
-    legs, arrivals = np.zeros(actions.shape), np.zeros(actions.shape)
-    delivered = np.zeros((*actions.shape, problem.n_materials)) if given is None else given
-    return_legs = np.zeros(problem.n_uavs)
-    _trace(arrays, episodes, actions, given is not None, legs, arrivals, delivered, return_legs)
-    tidy(arrays, actions, delivered, episodes.need[0])
-    routes = []
-    for i, uav in enumerate(problem.uavs):
-        stops = tuple(
-            Stop(
-                target_id=problem.targets[actions[s, i]].id,
-                step=int(s) + 1,
-                arrival_time=float(arrivals[s, i]),
-                distance=float(legs[s, i]),
-                delivered=tuple(delivered[s, i].tolist()),
-            )
-            for s in np.flatnonzero(actions[:, i] != problem.n_targets)
-        )
-        back = 0.0 if uav.ret else float(return_legs[i])
-        routes.append(Route(uav.id, sum(stop.distance for stop in stops), back, stops))
-    return Allocation(
+    trace = _new_trace(actions, problem.n_materials, given)
+    _trace(arrays, episodes, actions, given is not None, trace)
+    tidy(arrays, actions, trace.delivered, episodes.need[0])
+    world = uses_world(problem)
+    routes = _timed_routes(problem, actions, trace, episodes) if world else _routes(problem, actions, trace)
+    allocation = Allocation(
         plan=plan,
         reward=float(result.reward[0]),
         satisfaction=float(result.satisfaction[0]),
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
-        unmet=unmet_targets(problem, arrays, actions, delivered, episodes.need[0], hurry),
+        unmet=unmet_targets(problem, arrays, actions, trace.delivered, episodes.need[0], hurry),
+    )
+    if not world:
+        return allocation
+    return TimedAllocation(
+        **_values(allocation), makespan=float(result.makespan[0]), changes=_changes(problem, actions)
+    )
+
+
+def _routes(problem: Problem, actions: Actions, trace: Trace) -> Iterator[Route]:
+    for i, uav in enumerate(problem.uavs):
+        stops = tuple(_stop(problem, actions, trace, s, i) for s in _steps(problem, actions, i))
+        back = 0.0 if uav.ret else float(trace.return_legs[i])
+        yield Route(uav.id, sum(stop.distance for stop in stops), back, stops)
+
+
+def _stop(problem: Problem, actions: Actions, trace: Trace, s: int, i: int) -> Stop:
+    return Stop(
+        target_id=problem.targets[actions[s, i]].id,
+        step=s + 1,
+        arrival_time=float(trace.arrivals[s, i]),
+        distance=float(trace.legs[s, i]),
+        delivered=tuple(trace.delivered[s, i].tolist()),
+    )
+
+
+def _steps(problem: Problem, actions: Actions, i: int) -> list[int]:
+    """Return the steps, from 0, in which UAV `i` visits something."""
+    steps: list[int] = np.flatnonzero(actions[:, i] != problem.n_targets).tolist()
+    return steps
+
+
+def _timed_routes(
+    problem: Problem, actions: Actions, trace: Trace, episodes: simulator.Episodes
+) -> Iterator[LandingRoute]:
+    ways = Ways(problem)
+    for i, (uav, route) in enumerate(zip(problem.uavs, _routes(problem, actions, trace), strict=True)):
+        at, stops = visit.START, []
+        for s, stop in zip(_steps(problem, actions, i), route.stops, strict=True):
+            aloft = float(trace.aloft[s, i])
+            timed = TimedStop(
+                **_values(stop),
+                begin_time=float(trace.begins[s, i]),
+                departure_time=float(trace.departures[s, i]),
+                range_left=uav.voyage - float(trace.flown[s, i]),
+                endurance_left=None if uav.endurance is None else uav.endurance - aloft,
+                path=ways.to(i, at, int(actions[s, i]), stop.distance),
+            )
+            at = int(actions[s, i])
+            stops.append(timed)
+        landing = None
+        if not problem.objective.return_to_base:
+            landing = Landing(stops[-1].departure_time, None) if stops else None
+        elif stops or route.return_distance > 0.0:
+            time = float(episodes.clock[0, i] + trace.return_times[i])
+            landing = Landing(time, ways.home(i, at, route.return_distance))
+        yield LandingRoute(**{**_values(route), "stops": tuple(stops)}, landing=landing)
+
+
+def _changes(problem: Problem, actions: Actions) -> int:
+    """Count pairs of UAV and target that are visited in ``start_plan`` and not here (section 10)."""
+    before, now = (
+        {(i, j) for row in rows for i, j in enumerate(row) if j != problem.n_targets}
+        for rows in (problem.start_plan or (), actions.tolist())
+    )
+    return len(before - now)
+
+
+def _values(of: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by their names."""
+    return {each.name: getattr(of, each.name) for each in fields(of)}
+
+
+class Trace(NamedTuple):
+    """What a plan does, by step and UAV, (S', M) where nothing else is said.
+
+    Attributes
+    ----------
+    legs, arrivals, begins, departures
+        Length of the leg of each visit, when the UAV is there, when it begins, and when it has ended.
+    flown, aloft
+        Air length, and time in the air, at its end; the latter of UAVs for which it counts.
+    delivered
+        (S', M, K) what it unloads.
+    return_legs, return_times
+        (M,) length of the leg home after the last visit, and time until landing.
+    """
+
+    legs: Floats
+    arrivals: Floats
+    begins: Floats
+    departures: Floats
+    flown: Floats
+    aloft: Floats
+    delivered: Floats
+    return_legs: Floats
+    return_times: Floats
+
+
+def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> Trace:
+    """Make room for a trace; deliveries that are planned are in it already."""
+    shape, m = actions.shape, actions.shape[1]
+    return Trace(
+        legs=np.zeros(shape),
+        arrivals=np.zeros(shape),
+        begins=np.zeros(shape),
+        departures=np.zeros(shape),
+        flown=np.zeros(shape),
+        aloft=np.zeros(shape),
+        delivered=np.zeros((*shape, n_materials)) if delivered is None else delivered,
+        return_legs=np.zeros(m),
+        return_times=np.zeros(m),
     )
 
 
 @simulator.compiled
 def _trace(
-    arrays: ProblemArrays,
-    episodes: simulator.Episodes,
-    actions: Actions,
-    planned: bool,
-    legs: Floats,
-    arrivals: Floats,
-    delivered: Floats,
-    return_legs: Floats,
+    arrays: ProblemArrays, episodes: simulator.Episodes, actions: Actions, planned: bool, trace: Trace
 ) -> None:
-    """Fly the visits of a legal plan, and write down every leg and arrival, then the legs home.
+    """Fly the visits of a legal plan, and write down what each does, then the legs home.
 
-    Deliveries are written down too, unless they are planned: then `delivered` has them.
+    Deliveries are written down too, unless they are planned: then the trace has them.
     """
     for s in range(actions.shape[0]):
         for i in range(actions.shape[1]):
             j = actions[s, i]
-            if j == arrays.level.shape[1]:
+            if j == arrays.need.shape[1]:
                 continue
-            legs[s, i] = simulator.leg_to(arrays, episodes, 0, i, j)
-            arrivals[s, i] = episodes.clock[0, i] + legs[s, i] / arrays.speed[0, i]
+            length = simulator.leg_to(arrays, episodes, 0, i, j)
+            time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, length)
+            trace.legs[s, i], trace.arrivals[s, i] = length, episodes.clock[0, i] + time
+            trace.begins[s, i] = visit.begin_after(arrays, 0, j, trace.arrivals[s, i])
             if planned:
-                simulator.deliver(arrays, episodes, i, j, delivered, s)
-                continue
-            for k in range(delivered.shape[2]):
-                delivered[s, i, k] = min(episodes.load[0, i, k], episodes.need[0, j, k])
-            simulator.act(arrays, episodes, 0, i, j)
+                simulator.deliver(arrays, episodes, i, j, trace.delivered, s)
+            else:
+                for k in range(trace.delivered.shape[2]):
+                    trace.delivered[s, i, k] = min(episodes.load[0, i, k], episodes.need[0, j, k])
+                simulator.act(arrays, episodes, 0, i, j)
+            trace.departures[s, i], trace.flown[s, i] = episodes.clock[0, i], episodes.flown[0, i]
+            trace.aloft[s, i] = episodes.aloft[0, i]
     for i in range(actions.shape[1]):
-        return_legs[i] = simulator.leg_home(arrays, episodes, 0, i)
+        trace.return_legs[i] = simulator.leg_home(arrays, episodes, 0, i)
+        trace.return_times[i] = visit.time_home(arrays, 0, i, episodes.at[0, i])

@@ -18,8 +18,9 @@ class FlownPlan(NamedTuple):
     ----------
     visits
         Its routes. They have room for one visit more.
-    flown, clock
-        (M, L+1) distance and time before each visit, the last entry of a route after its last visit.
+    flown, clock, aloft
+        (M, L+1) air length, time and time in the air before each visit, the last entry of a route after its
+        last visit; the time in the air of UAVs for which it counts.
     load
         (M, L+1, K) what is aboard then.
     need
@@ -37,6 +38,7 @@ class FlownPlan(NamedTuple):
     visits: Visits
     flown: Floats
     clock: Floats
+    aloft: Floats
     load: Floats
     need: Floats
     value: Floats
@@ -66,6 +68,7 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
         visits,
         np.zeros((m, steps)),
         np.zeros((m, steps)),
+        np.zeros((m, steps)),
         np.zeros((m, steps, k)),
         np.zeros((m, steps, k)),
         np.zeros((m, steps)),
@@ -89,6 +92,7 @@ def _fly(
             if s > visits.length[i]:
                 continue
             plan.flown[i, s], plan.clock[i, s] = episodes.flown[0, i], episodes.clock[0, i]
+            plan.aloft[i, s] = episodes.aloft[0, i]
             for k in range(materials):
                 plan.load[i, s, k] = episodes.load[0, i, k]
             if s == visits.length[i]:
@@ -100,7 +104,7 @@ def _fly(
             if planned:
                 before = episodes.satisfaction[0]
                 simulator.deliver(arrays, episodes, i, j, delivered, s)
-                plan.value[i, s] = episodes.satisfaction[0] - before - arrays.weight[0] * plan.leg[i, s]
+                plan.value[i, s] = episodes.satisfaction[0] - before - arrays.terms[0].weight * plan.leg[i, s]
             else:
                 plan.value[i, s] = simulator.act(arrays, episodes, 0, i, j)
     for i in range(m):

@@ -14,8 +14,7 @@ import numpy as np
 
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit
-from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.deliveries import NONE
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.visit import inlined
 
@@ -114,7 +113,7 @@ def gain_of_visit(
     begin(trial, i, place, j)
     mark = tally[MARK]
     first = 0 if reloaded else place
-    take_up(plan, trial, i, first)
+    take_up(arrays, plan, trial, i, first)
     if reloaded:
         for k in range(plan.load.shape[2]):
             episodes.load[0, i, k] = arrays.load[0, i, k]
@@ -127,7 +126,7 @@ def gain_of_visit(
         if trial.uav_mark[h] != mark:
             # As it was until now, but the need of the target that it visits has changed.
             x = visits.target[h, s]
-            take_up(plan, trial, h, s)
+            take_up(arrays, plan, trial, h, s)
             if simulator.verdict(arrays, episodes, 0, h, x) == visit.ALLOWED:
                 exchange(total, plan.value[h, s], simulator.act(arrays, episodes, 0, h, x))
                 same = True
@@ -167,9 +166,11 @@ def gain_of_visit(
             q = _place_in_plan(trial, h, cursor)
             if q != NONE:
                 charge(total, -plan.value[h, q])
-        if arrays.charge_return[0]:
+        if arrays.terms[0].charge_return:
             back = simulator.leg_home(arrays, episodes, 0, h)
             exchange(total, -visit.cost_of(arrays, 0, plan.back[h]), -visit.cost_of(arrays, 0, back))
+    if visit.has_closing_cost(arrays, 0):
+        exchange(total, -_closing_cost(arrays, plan, trial, False), -_closing_cost(arrays, plan, trial, True))
     if trial.target_mark[j] == mark:
         lacked, lacks = 0.0, 0.0
         for k in range(plan.load.shape[2]):
@@ -193,21 +194,22 @@ def gain_of_undisturbed_visit(
     if place < plan.visits.length[i]:
         leg = visit.leg(arrays, 0, i, j, plan.visits.target[i, place])
         exchange(total, -visit.cost_of(arrays, 0, plan.leg[i, place]), -visit.cost_of(arrays, 0, leg))
-    elif arrays.charge_return[0]:
+    elif arrays.terms[0].charge_return:
         back = simulator.leg_home(arrays, trial.episodes, 0, i)
         exchange(total, -visit.cost_of(arrays, 0, plan.back[i]), -visit.cost_of(arrays, 0, back))
     return gain(total)
 
 
 @inlined
-def is_undisturbed(plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
+def is_undisturbed(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int) -> bool:
     """Whether a visit after which all others are legal changes nothing but the way of its UAV.
 
     The UAV and the target are as they are in the plan at that place, and the plan does not visit it any
     more. The UAV has enough for its later visits, and nobody comes in between where they are a step later.
     """
-    m, length, undisturbed = plan.back.shape[0], plan.visits.length[i], True
-    if place < length:
+    m, length = plan.back.shape[0], plan.visits.length[i]
+    undisturbed = not visit.has_closing_cost(arrays, 0) and (place == length or not visit.decays(arrays, 0))
+    if undisturbed and place < length:
         for k in range(plan.load.shape[2]):
             taken = min(plan.load[i, place, k], trial.episodes.need[0, j, k])
             undisturbed = undisturbed and taken <= plan.load[i, length, k]
@@ -215,6 +217,38 @@ def is_undisturbed(plan: FlownPlan, trial: Trial, i: int, place: int, j: int) ->
             following = plan.visits.following[s * m + i]
             undisturbed = undisturbed and (following == NONE or following > (s + 1) * m + i)
     return undisturbed
+
+
+@simulator.compiled
+def _closing_cost(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, changed: bool) -> float:
+    """What makespan and changes cost in the plan, or with what the trial has changed in it."""
+    episodes, makespan, changes = trial.episodes, 0.0, 0.0
+    for h in range(plan.back.shape[0]):
+        length = plan.visits.length[h]
+        if changed and trial.uav_mark[h] == trial.tally[MARK]:
+            if episodes.visits[0, h] > 0:
+                landing = episodes.clock[0, h] + visit.time_home(arrays, 0, h, episodes.at[0, h])
+                makespan = max(makespan, landing)
+            for w in range(arrays.before.shape[2]):
+                if arrays.before[0, h, w] != NONE and not episodes.kept[0, h, w]:
+                    changes += 1.0
+            continue
+        if length > 0:
+            at = plan.visits.target[h, length - 1]
+            makespan = max(makespan, plan.clock[h, length] + visit.time_home(arrays, 0, h, at))
+        for w in range(arrays.before.shape[2]):
+            if arrays.before[0, h, w] != NONE and not _visits_before(arrays, plan, h, length, w):
+                changes += 1.0
+    return visit.closing_cost(arrays, 0, makespan, changes)
+
+
+@inlined
+def _visits_before(arrays: ProblemArrays, plan: FlownPlan, h: int, place: int, w: int) -> bool:
+    """Whether a UAV makes a visit of ``start_plan`` among the first `place` visits of its route."""
+    found = False
+    for s in range(place):
+        found = found or plan.visits.target[h, s] == arrays.before[0, h, w]
+    return found
 
 
 @inlined
@@ -255,13 +289,17 @@ def move_to(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
     trial.episodes.at[0, i] = visit.START if place == 0 else plan.visits.target[i, place - 1]
     trial.episodes.flown[0, i] = plan.flown[i, place]
     trial.episodes.clock[0, i] = plan.clock[i, place]
+    trial.episodes.aloft[0, i] = plan.aloft[i, place]
+    trial.episodes.visits[0, i] = place
     trial.episodes.ret[0, i] = False
 
 
 @inlined
-def take_up(plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
+def take_up(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int) -> None:
     """Put UAV `i` where it is in the plan before its visit `place`, with what it has then."""
     move_to(plan, trial, i, place)
+    for w in range(trial.episodes.kept.shape[2]):
+        trial.episodes.kept[0, i, w] = _visits_before(arrays, plan, i, place, w)
     for k in range(plan.load.shape[2]):
         trial.episodes.load[0, i, k] = plan.load[i, place, k]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation import simulator, visit
-from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     MADE,
@@ -36,13 +36,13 @@ _WORK = 2_000_000
 _PIECE = 40_000
 """Of them, between two looks at the clock."""
 
-NONE = -1
-"""In place of a UAV: there is none."""
-
 AS_IS = 8
 """Place in :class:`Places`, after those for every sum of what is lacking, of the best visit that is legal."""
 
-_COMERS, _IN_RANGE, _IN_TIME = range(3)
+_COMERS, _IN_RANGE, _IN_TIME, _ABLE = range(4)
+
+_EASED = 1e20
+"""Range that is enough for every leg that exists, and for none that does not."""
 
 
 class Start(NamedTuple):
@@ -54,12 +54,31 @@ class Start(NamedTuple):
         (N,) the UAV that carries something needed and lacks least range, and how much it lacks.
     fastest, arrival
         (N,) the UAV among those with the range that arrives first, and when.
+    able
+        (N,) a UAV that could fly there directly, whatever it is committed to.
     """
 
     carrier: Integers
     missing: Floats
     fastest: Integers
     arrival: Floats
+    able: Integers
+
+
+class DirectNeeds(NamedTuple):
+    """What a flight from the start to a target, and home where it is required, takes of a UAV.
+
+    Attributes
+    ----------
+    aloft, waiting
+        Time in the air, and how much of it is waiting.
+    landing
+        When the UAV has landed.
+    """
+
+    aloft: float
+    waiting: float
+    landing: float
 
 
 class Places(NamedTuple):
@@ -76,6 +95,9 @@ class Places(NamedTuple):
         routes, and what that would earn at most.
     left_over
         (1,) whether any UAV that could come has something useful left over.
+    blocked
+        (3,) UAV, place and rule of the first visit with something left over that range, time and steps would
+        not make legal.
     """
 
     uav: Integers
@@ -85,17 +107,39 @@ class Places(NamedTuple):
     loader_place: Integers
     hope: Floats
     left_over: Integers
+    blocked: Integers
 
 
 def look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers) -> Start:
     """Look at the swarm from some targets."""
     n = arrays.shape[1]
     start = Start(
-        np.full(n, NONE, np.int64), np.full(n, np.inf), np.full(n, NONE, np.int64), np.full(n, np.inf)
-    )
+        np.full(n, NONE, np.int64), np.full(n, np.inf), np.full(n, NONE, np.int64), np.full(n, np.inf),
+        np.full(n, NONE, np.int64),
+    )  # fmt: skip
     # What is found does not depend on the order; neighbours in memory are quicker one after the other.
     _look_from_start(arrays, plan, np.sort(targets), start)
     return start
+
+
+def needs_of(arrays: ProblemArrays, i: int, j: int) -> DirectNeeds:
+    """Work out what a flight of UAV `i` from its start to target `j` takes."""
+    found = np.zeros(3)
+    _measure(arrays, i, j, found)
+    return DirectNeeds(*found.tolist())
+
+
+@simulator.compiled
+def _measure(arrays: ProblemArrays, i: int, j: int, found: Floats) -> None:
+    clock = visit.ready(arrays, 0, i)
+    length = visit.leg(arrays, 0, i, visit.START, j)
+    arrival = clock + visit.leg_time(arrays, 0, i, visit.START, j, length)
+    end = visit.departure_after(arrays, 0, j, arrival)
+    aloft = visit.aloft_after(arrays, 0, i, True, visit.airborne(arrays, 0, i), clock, arrival, end, j)
+    back = visit.time_home(arrays, 0, i, j)
+    on_ground = end - clock + visit.airborne(arrays, 0, i) - aloft
+    found[0], found[2] = aloft + back, end + back
+    found[1] = max(0.0, visit.begin_after(arrays, 0, j, arrival) - arrival - on_ground)
 
 
 class Lookout:
@@ -121,7 +165,7 @@ class Lookout:
     ) -> None:
         # Copies of what is eased for a while.
         self._arrays = arrays._replace(
-            voyage=arrays.voyage.copy(), deadline=arrays.deadline.copy(), max_steps=arrays.max_steps.copy()
+            uavs=arrays.uavs.copy(), areas=arrays.areas.copy(), max_steps=arrays.max_steps.copy()
         )
         self._plan, self._trial, self._planned, self._hurry = plan, trial, planned, hurry
         # A visit with many materials takes longer.
@@ -140,12 +184,13 @@ class Lookout:
             return None
         comers = _COMERS if start.fastest[j] < 0 else _IN_RANGE
         if comers == _IN_RANGE and not visit.is_late(
-            float(start.arrival[j]), float(self._arrays.deadline[0, j])
+            float(start.arrival[j]), float(self._arrays.areas["deadline"][0, j])
         ):
-            comers = _IN_TIME
+            comers = _IN_TIME if start.able[j] < 0 else _ABLE
         found = Places(
             np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
             np.full(2, NONE, np.int64), np.zeros(2, np.int64), np.full(2, -np.inf), np.zeros(1, np.int64),
+            np.array([NONE, 0, 0]),
         )  # fmt: skip
         i = 0
         while True:
@@ -171,7 +216,7 @@ class Lookout:
         if lacks & TIME:
             route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
             for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
-                deadline = float(self._arrays.deadline[0, x])
+                deadline = float(self._arrays.areas["deadline"][0, x])
                 if visit.is_late(deadline + after, deadline):
                     late[x] = max(after, late.get(x, 0.0))
         return bool(lacks & STEP), float(self._lacking[1]) if lacks & RANGE else 0.0, late
@@ -186,40 +231,65 @@ def _carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
     return bool(useful and not arrays.ret[0, i])
 
 
-@inlined
-def _missing(arrays: ProblemArrays, i: int, j: int) -> float:
-    """Range that a UAV lacks to fly to a target directly; negative where it has more than that."""
-    flown = arrays.dis[0, i] + visit.leg(arrays, 0, i, visit.START, j)
-    missing: float = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.voyage[0, i]
-    return missing
+@simulator.compiled
+def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
+    """Rule that a UAV's flight from its start to a target breaks, whatever it unloads and is committed to."""
+    length = visit.leg(arrays, 0, i, visit.START, j)
+    time = visit.leg_time(arrays, 0, i, visit.START, j, length)
+    if visit.is_barred(arrays, 0, i, visit.START, j):
+        return visit.BARRED
+    if visit.is_out_of_range(
+        arrays, 0, i, j, arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
+    ):
+        return visit.OUT_OF_RANGE
+    clock = visit.ready(arrays, 0, i)
+    if visit.is_late(clock + time, arrays.areas[0, j].deadline):
+        return visit.TOO_LATE
+    if visit.is_watched(arrays, 0, i):
+        end = visit.departure_after(arrays, 0, j, clock + time)
+        aloft = visit.aloft_after(
+            arrays, 0, i, True, visit.airborne(arrays, 0, i), clock, clock + time, end, j
+        )
+        if visit.exceeds_endurance(arrays, 0, i, j, aloft):
+            return visit.TOO_LONG_ALOFT
+        if visit.lands_late(arrays, 0, i, j, end):
+            return visit.HOME_TOO_LATE
+    return visit.ALLOWED
 
 
 @simulator.compiled
 def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, start: Start) -> None:
     """Which UAV carries what a target needs, which of these has the range, and which of those is first."""
-    for i in range(arrays.speed.shape[1]):
+    for i in range(arrays.load.shape[1]):
         for q in range(targets.shape[0]):
             j = targets[q]
             if not _carries(arrays, plan, i, j):
                 continue
-            missing = _missing(arrays, i, j)
+            length = visit.leg(arrays, 0, i, visit.START, j)
+            time = visit.leg_time(arrays, 0, i, visit.START, j, length)
+            flown = arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
+            missing = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.uavs[0, i].voyage
             if missing < start.missing[j]:
                 start.missing[j], start.carrier[j] = missing, i
-            if arrays.voyage[0, i] + missing <= visit.farthest(arrays.voyage[0, i]):
-                arrival = visit.arrival_after(arrays, 0, i, 0.0, visit.leg(arrays, 0, i, visit.START, j))
+            rule = direct_rule(arrays, i, j)
+            if rule not in (visit.BARRED, visit.OUT_OF_RANGE):
+                arrival = visit.ready(arrays, 0, i) + time
                 if arrival < start.arrival[j]:
                     start.arrival[j], start.fastest[j] = arrival, i
+            if rule == visit.ALLOWED and start.able[j] < 0:
+                start.able[j] = i
 
 
 @inlined
 def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) -> bool:
-    """Whether a UAV counts among those that could come: carriers, those in range, or those in time too."""
-    voyage = arrays.voyage[0, i]
-    in_range = voyage + _missing(arrays, i, j) <= visit.farthest(voyage)
-    arrival = visit.arrival_after(arrays, 0, i, 0.0, visit.leg(arrays, 0, i, visit.START, j))
-    in_time = not visit.is_late(arrival, arrays.deadline[0, j])
-    near = (comers < _IN_RANGE or in_range) and (comers < _IN_TIME or in_time)
-    return near and _carries(arrays, plan, i, j)
+    """Whether a UAV counts among those that could come: carriers, those in range, in time, or able to."""
+    comes = _carries(arrays, plan, i, j)
+    if comes and comers > _COMERS:
+        rule = direct_rule(arrays, i, j)
+        in_range = rule not in (visit.BARRED, visit.OUT_OF_RANGE)
+        enough = comers == _IN_RANGE or (comers == _IN_TIME and rule != visit.TOO_LATE)
+        comes = rule == visit.ALLOWED or (in_range and enough)
+    return comes
 
 
 @simulator.compiled
@@ -267,6 +337,8 @@ def _look(
             _note_loader(found, i, place, hope, lack)
             for easy in range(2):
                 if easy == 0 and not legal:
+                    if lack == 0 and left_over:
+                        _note_blocked(arrays, plan, trial, found, i, place, j)
                     continue
                 if easy == 1:
                     if lack == 0 or not left_over:
@@ -277,6 +349,8 @@ def _look(
                 else:
                     gain = gain_of_planned_visit(arrays, plan, trial, planned, i, place, j, False)
                 if easy == 1:
+                    if tally[MADE] == 0:
+                        _note_blocked(arrays, plan, trial, found, i, place, j)
                     _ease_no_more(arrays, plan, i, j, kept)
                 if tally[MADE] == 0:
                     continue
@@ -291,11 +365,11 @@ def _look(
 def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) -> None:
     """Give a UAV range and its visits time and a step without limit; what they had is kept."""
     length = plan.visits.length[i]
-    kept[0], kept[1] = arrays.voyage[0, i], arrays.deadline[0, j]
-    arrays.voyage[0, i], arrays.deadline[0, j] = np.inf, np.inf
+    kept[0], kept[1] = arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline
+    arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = _EASED, np.inf
     for s in range(length):
         x = plan.visits.target[i, s]
-        kept[2 + s], arrays.deadline[0, x] = arrays.deadline[0, x], np.inf
+        kept[2 + s], arrays.areas[0, x].deadline = arrays.areas[0, x].deadline, np.inf
     arrays.max_steps[0] += 1
 
 
@@ -305,8 +379,8 @@ def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: 
     length = plan.visits.length[i]
     arrays.max_steps[0] -= 1
     for s in range(length):
-        arrays.deadline[0, plan.visits.target[i, length - 1 - s]] = kept[1 + length - s]
-    arrays.voyage[0, i], arrays.deadline[0, j] = kept[0], kept[1]
+        arrays.areas[0, plan.visits.target[i, length - 1 - s]].deadline = kept[1 + length - s]
+    arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = kept[0], kept[1]
 
 
 @inlined
@@ -318,7 +392,7 @@ def _is_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, plac
         move_to(plan, trial, i, place)
         legal = simulator.reach_verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     if legal:
-        take_up(plan, trial, i, place)
+        take_up(arrays, plan, trial, i, place)
         need_at(plan, trial, j, place * plan.back.shape[0] + i)
         legal = simulator.verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     return legal
@@ -330,9 +404,9 @@ def _greedy_gain(
 ) -> float:
     """Change of the reward with a legal visit; quick where it takes nothing from other visits."""
     begin(trial, i, place, j)
-    take_up(plan, trial, i, place)
+    take_up(arrays, plan, trial, i, place)
     alone = need_at(plan, trial, j, place * plan.back.shape[0] + i) and keeps_all
-    if alone and is_undisturbed(plan, trial, i, place, j):
+    if alone and is_undisturbed(arrays, plan, trial, i, place, j):
         gain = gain_of_undisturbed_visit(arrays, plan, trial, i, place, j)
     else:
         gain = gain_of_visit(arrays, plan, trial, i, place, j, False)
@@ -355,6 +429,18 @@ def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) ->
     hope: float = visit.earned_by(arrays, 0, j, still)
     hope -= visit.cost_of(arrays, 0, detour(arrays, plan, i, place, j))
     return hope
+
+
+@inlined
+def _note_blocked(
+    arrays: ProblemArrays, plan: FlownPlan, trial: Trial, found: Places, i: int, place: int, j: int
+) -> None:
+    """Keep the first visit that another rule than range, deadline and steps forbids."""
+    if found.blocked[0] < 0:
+        move_to(plan, trial, i, place)
+        rule = simulator.reach_verdict(arrays, trial.episodes, 0, i, j)
+        if rule != visit.ALLOWED:
+            found.blocked[0], found.blocked[1], found.blocked[2] = i, place, rule
 
 
 @inlined

@@ -13,8 +13,8 @@ import numpy as np
 
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
-from app.simulation.deliveries import NONE, Unloading, Visits, new_unloading, serve, visits_of
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
+from app.simulation.deliveries import Unloading, Visits, new_unloading, serve, visits_of
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     CHANGED,
@@ -154,7 +154,8 @@ def _keep_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, planned: P
     i, place, j = trial.inserted[0], trial.inserted[1], trial.inserted[2]
     episodes, length = trial.episodes, plan.visits.length[i]
     episodes.at[0, i] = visit.START
-    episodes.flown[0, i], episodes.clock[0, i] = arrays.dis[0, i], 0.0
+    episodes.flown[0, i], episodes.clock[0, i] = arrays.uavs[0, i].dis, visit.ready(arrays, 0, i)
+    episodes.aloft[0, i], episodes.visits[0, i] = visit.airborne(arrays, 0, i), 0
     steps, whole = 0, True
     # Number s, then the additional visit where it comes before it.
     for q in range(2 * length + 1):
@@ -241,7 +242,7 @@ def _amounts_anew(
     total[GAIN], total[TURNOVER] = 0.0, 0.0
     useful = place == NONE or _can_unload(arrays.load, arrays.need, visits, unloading.amount, i, j)
     planned.known[row, UNLOADS] = 1 if useful else 0
-    lacks, lacked = arrays.need_total[0, j], 0.0
+    lacks, lacked = arrays.areas[0, j].need_total, 0.0
     slot = visits.first[j]
     while slot != NONE:
         for k in range(plan.need.shape[2]):
@@ -319,6 +320,6 @@ def _charge_way(
                 exchange(total, -visit.cost_of(arrays, 0, leg[h, s]), -visit.cost_of(arrays, 0, now))
             at = x
         before = x
-    if arrays.charge_return[0] and at != before:
+    if arrays.terms[0].charge_return and at != before:
         now = visit.way_home(arrays, 0, h, at)
         exchange(total, -visit.cost_of(arrays, 0, back[h]), -visit.cost_of(arrays, 0, now))

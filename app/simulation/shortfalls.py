@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.simulation import simulator, visit
 from app.simulation.arrays import Floats, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
@@ -24,7 +26,7 @@ def detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -
     extra = _leg(arrays, plan, i, place, j)
     if place < plan.visits.length[i]:
         extra += visit.leg(arrays, 0, i, j, plan.visits.target[i, place]) - plan.leg[i, place]
-    elif arrays.charge_return[0]:
+    elif arrays.terms[0].charge_return:
         extra += visit.way_home(arrays, 0, i, j) - plan.back[i]
     return extra
 
@@ -48,25 +50,24 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
     int
         The sum of what is lacking, beyond the tolerance.
     """
-    length, voyage = plan.visits.length[i], arrays.voyage[0, i]
-    there, extra = _leg(arrays, plan, i, place, j), detour(arrays, plan, i, place, j)
+    length, voyage = plan.visits.length[i], arrays.uavs[0, i].voyage
     lack = 0
     lacks[0] = 0.0
     if length >= arrays.max_steps[0]:
         lacks[0], lack = 1.0, STEP
-    lacks[1] = visit.flown_with_return(arrays, 0, i, j, plan.flown[i, place] + there) - voyage
-    arrival = visit.arrival_after(arrays, 0, i, plan.clock[i, place], there)
-    lacks[2] = arrival - arrays.deadline[0, j]
-    late = visit.is_late(arrival, arrays.deadline[0, j])
-    for s in range(place, length):
-        x = plan.visits.target[i, s]
-        reach = visit.flown_with_return(arrays, 0, i, x, plan.flown[i, s + 1] + extra)
-        lacks[1] = max(lacks[1], reach - voyage)
-        arrival = visit.departure_after(
-            arrays, 0, j, visit.arrival_after(arrays, 0, i, plan.clock[i, s], plan.leg[i, s] + extra)
-        )
-        lacks[3 + s - place] = arrival - arrays.deadline[0, x]
-        late = late or visit.is_late(arrival, arrays.deadline[0, x])
+    at = visit.START if place == 0 else plan.visits.target[i, place - 1]
+    flown, clock, late = plan.flown[i, place], plan.clock[i, place], False
+    lacks[1] = -np.inf
+    for s in range(place - 1, length):
+        x = j if s < place else plan.visits.target[i, s]
+        leg = visit.leg(arrays, 0, i, at, x)
+        time = visit.leg_time(arrays, 0, i, at, x, leg)
+        flown += visit.air_length(arrays, 0, i, leg, time)
+        lacks[1] = max(lacks[1], visit.flown_with_return(arrays, 0, i, x, flown) - voyage)
+        arrival = clock + time
+        lacks[3 + s - place] = arrival - arrays.areas[0, x].deadline
+        late = late or visit.is_late(arrival, arrays.areas[0, x].deadline)
+        clock, at = visit.departure_after(arrays, 0, x, arrival), x
     if voyage + lacks[1] > visit.farthest(voyage):
         lack += RANGE
     return lack + TIME if late else lack

@@ -13,28 +13,49 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.visit import (
     ALLOWED,
+    BARRED,
+    COMMITTED_ELSEWHERE,
+    HOME_TOO_LATE,
     NO_SUCH_ACTION,
     OUT_OF_RANGE,
     RETURNING,
     START,
     TOO_LATE,
+    TOO_LONG_ALOFT,
     TOO_MANY_STEPS,
     TOO_MUCH,
     UNLOADS_NOTHING,
     Function,
-    arrival_after,
+    air_length,
+    airborne,
+    aloft_after,
+    begin_after,
+    bonus_of,
     can_unload,
+    closing_cost,
     cost_of,
+    decays,
     departure_after,
+    discount,
     earned_by,
+    exceeds_endurance,
+    has_bonus,
+    has_closing_cost,
+    is_barred,
+    is_committed_elsewhere,
     is_late,
     is_out_of_range,
+    is_watched,
+    lands_late,
     left_of,
     leg,
+    leg_time,
+    ready,
+    time_home,
     way_home,
 )
 
@@ -60,13 +81,19 @@ class Episodes(NamedTuple):
     at
         (B, M) where each UAV is: ``START``, a target, or N for its starting point.
     flown, clock
-        (B, M) distance flown and time passed.
+        (B, M) air length flown in this flight, and the time.
+    aloft
+        (B, M) time in the air in this flight, of UAVs for which it counts.
+    visits
+        (B, M) visits made.
     ret
         (B, M) UAVs that have been sent home.
     load
         (B, M, K) amounts still carried.
     need
         (B, N, K) amounts still needed.
+    kept
+        (B, M, W) visits of ``start_plan`` that were made.
     satisfaction, distance
         (B,) what the episode has earned, and flown against the reward.
     step
@@ -79,9 +106,12 @@ class Episodes(NamedTuple):
     at: Integers
     flown: Floats
     clock: Floats
+    aloft: Floats
+    visits: Integers
     ret: Flags
     load: Floats
     need: Floats
+    kept: Flags
     satisfaction: Floats
     distance: Floats
     step: Integers
@@ -93,7 +123,7 @@ class Replay(NamedTuple):
 
     Attributes
     ----------
-    reward, satisfaction, distance
+    reward, satisfaction, distance, makespan, changes
         (B,) up to the first action that is not allowed.
     rule, step, uav
         (B,) the rule it breaks (0 for a legal plan), its step and UAV, counted from 0.
@@ -102,6 +132,8 @@ class Replay(NamedTuple):
     reward: Floats
     satisfaction: Floats
     distance: Floats
+    makespan: Floats
+    changes: Floats
     rule: Integers
     step: Integers
     uav: Integers
@@ -120,14 +152,18 @@ def new_episodes(arrays: ProblemArrays, batch: int, problem: Integers | None = N
         (B,) index of each episode's problem; all the first one by default.
     """
     m, n, k = arrays.shape
+    before = arrays.before.shape[2]
     episodes = Episodes(
         problem=np.zeros(batch, np.int64) if problem is None else np.ascontiguousarray(problem, np.int64),
         at=np.empty((batch, m), np.int64),
         flown=np.empty((batch, m)),
         clock=np.empty((batch, m)),
+        aloft=np.empty((batch, m)),
+        visits=np.empty((batch, m), np.int64),
         ret=np.empty((batch, m), np.bool_),
         load=np.empty((batch, m, k)),
         need=np.empty((batch, n, k)),
+        kept=np.empty((batch, m, before), np.bool_),
         satisfaction=np.empty(batch),
         distance=np.empty(batch),
         step=np.empty(batch, np.int64),
@@ -151,9 +187,13 @@ def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
     materials = episodes.load.shape[2]
     for i in range(episodes.at.shape[1]):
         episodes.at[b, i] = START
-        episodes.flown[b, i] = arrays.dis[p, i]
-        episodes.clock[b, i] = 0.0
+        episodes.flown[b, i] = arrays.uavs[p, i].dis
+        episodes.clock[b, i] = ready(arrays, p, i)
+        episodes.aloft[b, i] = airborne(arrays, p, i)
+        episodes.visits[b, i] = 0
         episodes.ret[b, i] = arrays.ret[p, i]
+        for w in range(episodes.kept.shape[2]):
+            episodes.kept[b, i, w] = False
         for k in range(materials):
             episodes.load[b, i, k] = arrays.load[p, i, k]
     for j in range(episodes.need.shape[1]):
@@ -194,31 +234,56 @@ def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -
 
 @compiled
 def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> int:
-    """Range and deadline of rule 2: ``ALLOWED``, ``OUT_OF_RANGE`` or ``TOO_LATE``, whatever is unloaded."""
-    p = episodes.problem[b]
-    d = leg_to(arrays, episodes, b, i, j)
-    if is_out_of_range(arrays, p, i, j, episodes.flown[b, i] + d):
-        return OUT_OF_RANGE
-    if is_late(arrival_after(arrays, p, i, episodes.clock[b, i], d), arrays.deadline[p, j]):
+    """All of rule 2 but whether something is unloaded: ``ALLOWED``, or the rule that forbids the visit."""
+    p, at, clock = episodes.problem[b], episodes.at[b, i], episodes.clock[b, i]
+    length = leg(arrays, p, i, at, j)
+    time = leg_time(arrays, p, i, at, j, length)
+    if is_out_of_range(arrays, p, i, j, episodes.flown[b, i] + air_length(arrays, p, i, length, time)):
+        return BARRED if is_barred(arrays, p, i, at, j) else OUT_OF_RANGE
+    if is_late(clock + time, arrays.areas[p, j].deadline):
         return TOO_LATE
+    if is_committed_elsewhere(arrays, p, i, episodes.visits[b, i], j):
+        return COMMITTED_ELSEWHERE
+    if is_watched(arrays, p, i):
+        end = departure_after(arrays, p, j, clock + time)
+        first = episodes.visits[b, i] == 0
+        aloft = aloft_after(arrays, p, i, first, episodes.aloft[b, i], clock, clock + time, end, j)
+        if exceeds_endurance(arrays, p, i, j, aloft):
+            return TOO_LONG_ALOFT
+        if lands_late(arrays, p, i, j, end):
+            return HOME_TOO_LATE
     return ALLOWED
+
+
+@compiled
+def promised(arrays: ProblemArrays, episodes: Episodes, b: int, i: int) -> int:
+    """Return the target that UAV `i` is committed to next, if that visit is allowed; else N."""
+    p, visits, home = episodes.problem[b], episodes.visits[b, i], arrays.need.shape[1]
+    if visits < arrays.committed.shape[2]:
+        j = arrays.committed[p, i, visits]
+        if j not in (NONE, home) and verdict(arrays, episodes, b, i, j) == ALLOWED:
+            return j
+    return home
 
 
 @compiled
 def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) -> float:
     """Let UAV `i` take an action that is allowed, and return what it earns (rules 1 and 3 to 5).
 
-    A UAV that has returned stays home and earns nothing.
+    A UAV that has returned stays home and earns nothing. What is lost at the end is not in it
+    (:func:`closing`).
     """
-    p, home = episodes.problem[b], arrays.level.shape[1]
+    p, home = episodes.problem[b], arrays.need.shape[1]
     if action == home:
         if episodes.ret[b, i]:
             return 0.0
         d = leg_home(arrays, episodes, b, i)
+        if episodes.visits[b, i] > 0:
+            episodes.clock[b, i] += time_home(arrays, p, i, episodes.at[b, i])
         episodes.ret[b, i] = True
         episodes.at[b, i] = home
         episodes.flown[b, i] += d
-        if not arrays.charge_return[p]:
+        if not arrays.terms[p].charge_return:
             return 0.0
         episodes.distance[b] += d
         return -cost_of(arrays, p, d)
@@ -229,35 +294,69 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
         unloaded = min(load, need)
         if unloaded > 0.0:
             # One of the two is used up; what is left of the other is seldom so little that it is rounding.
-            if 0.0 < max(load, need) - unloaded < arrays.crumb[p]:
+            if 0.0 < max(load, need) - unloaded < arrays.terms[p].crumb:
                 earned += unload(arrays, episodes, b, i, action, k, unloaded)
             else:
                 episodes.load[b, i, k], episodes.need[b, action, k] = load - unloaded, need - unloaded
                 earned += earned_by(arrays, p, action, unloaded)
+                if has_bonus(arrays, p):
+                    earned += bonus_of(arrays, p, action, k, need, unloaded)
+    if decays(arrays, p):
+        earned *= discount(arrays, p, episodes.clock[b, i] - arrays.areas[p, action].service)
     episodes.satisfaction[b] += earned
     return earned - cost_of(arrays, p, d)
 
 
 @compiled
+def earned_now(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, unloaded: float) -> float:
+    """Satisfaction that an allowed visit of UAV `i` to target `j` would bring now (rule 5).
+
+    `unloaded` is what it would unload, all materials together.
+    """
+    p = episodes.problem[b]
+    earned = earned_by(arrays, p, j, unloaded)
+    if has_bonus(arrays, p):
+        for k in range(episodes.load.shape[2]):
+            need = episodes.need[b, j, k]
+            earned += bonus_of(arrays, p, j, k, need, min(episodes.load[b, i, k], need))
+    if decays(arrays, p):
+        at = episodes.at[b, i]
+        arrival = episodes.clock[b, i] + leg_time(arrays, p, i, at, j, leg(arrays, p, i, at, j))
+        earned *= discount(arrays, p, begin_after(arrays, p, j, arrival))
+    return earned
+
+
+@compiled
 def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
     """Take UAV `i` to target `j` and through its service time (rules 1 and 3); return the leg's length."""
-    p = episodes.problem[b]
-    d = leg_to(arrays, episodes, b, i, j)
-    arrival = arrival_after(arrays, p, i, episodes.clock[b, i], d)
-    episodes.clock[b, i] = departure_after(arrays, p, j, arrival)
-    episodes.flown[b, i] += d
+    p, at, clock = episodes.problem[b], episodes.at[b, i], episodes.clock[b, i]
+    length = leg(arrays, p, i, at, j)
+    time = leg_time(arrays, p, i, at, j, length)
+    end = departure_after(arrays, p, j, clock + time)
+    if is_watched(arrays, p, i):
+        first = episodes.visits[b, i] == 0
+        episodes.aloft[b, i] = aloft_after(
+            arrays, p, i, first, episodes.aloft[b, i], clock, clock + time, end, j
+        )
+    episodes.clock[b, i] = end
+    episodes.flown[b, i] += air_length(arrays, p, i, length, time)
     episodes.at[b, i] = j
-    episodes.distance[b] += d
-    return d
+    episodes.visits[b, i] += 1
+    episodes.distance[b] += length
+    for w in range(episodes.kept.shape[2]):
+        if arrays.before[p, i, w] == j:
+            episodes.kept[b, i, w] = True
+    return length
 
 
 @compiled
 def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k: int, amount: float) -> float:
     """Unload an amount of material `k`, and return what it earns (rules 4 and 5)."""
-    p = episodes.problem[b]
+    p, need = episodes.problem[b], episodes.need[b, j, k]
     episodes.load[b, i, k] = left_of(episodes.load[b, i, k], amount, arrays.load[p, i, k])
-    episodes.need[b, j, k] = left_of(episodes.need[b, j, k], amount, arrays.requested[p, j, k])
-    return earned_by(arrays, p, j, amount)
+    episodes.need[b, j, k] = left_of(need, amount, arrays.requested[p, j, k])
+    earned = earned_by(arrays, p, j, amount)
+    return earned + bonus_of(arrays, p, j, k, need, amount) if has_bonus(arrays, p) else earned
 
 
 @compiled
@@ -270,17 +369,47 @@ def end_step(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
     Returns
     -------
     float
-        What the legs home at the end cost, 0 or less.
+        What the end costs, 0 or less: the legs home, the makespan and changes.
     """
     episodes.step[b] += 1
     p = episodes.problem[b]
     if episodes.step[b] < arrays.max_steps[p] and any_allowed(arrays, episodes, b):
         return 0.0
     episodes.done[b] = True
+    return close(arrays, episodes, b)
+
+
+@compiled
+def close(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
+    """Let every UAV that is still out fly home, and return what the end costs, 0 or less (section 10)."""
     charged = 0.0
     for i in range(episodes.ret.shape[1]):
-        charged += act(arrays, episodes, b, i, arrays.level.shape[1])
+        charged += act(arrays, episodes, b, i, arrays.need.shape[1])
+    p = episodes.problem[b]
+    if has_closing_cost(arrays, p):
+        charged -= closing_cost(arrays, p, makespan_of(arrays, episodes, b), changes_of(arrays, episodes, b))
     return charged
+
+
+@compiled
+def makespan_of(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
+    """Time until the last UAV with a visit has landed, if those that are out fly home now; 0 without any."""
+    makespan, p = 0.0, episodes.problem[b]
+    for i in range(episodes.ret.shape[1]):
+        if episodes.visits[b, i] > 0:
+            makespan = max(makespan, episodes.clock[b, i] + time_home(arrays, p, i, episodes.at[b, i]))
+    return makespan
+
+
+@compiled
+def changes_of(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
+    """Pairs of UAV and target that are visited in ``start_plan`` and were not here."""
+    changes, p = 0.0, episodes.problem[b]
+    for i in range(episodes.kept.shape[1]):
+        for w in range(episodes.kept.shape[2]):
+            if arrays.before[p, i, w] != NONE and not episodes.kept[b, i, w]:
+                changes += 1.0
+    return changes
 
 
 @compiled
@@ -349,13 +478,14 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
     n, k = arrays.need.shape[1], arrays.need.shape[2]
     planned = delivered.shape[0] > 0
     result = Replay(
-        np.zeros(batch), np.zeros(batch), np.zeros(batch),
+        np.zeros(batch), np.zeros(batch), np.zeros(batch), np.zeros(batch), np.zeros(batch),
         np.zeros(batch, np.int64), np.zeros(batch, np.int64), np.zeros(batch, np.int64),
     )  # fmt: skip
     # One episode's worth of state serves the whole batch: it stays in the processor's cache.
     state = Episodes(
         np.zeros(1, np.int64), np.empty((1, m), np.int64), np.empty((1, m)), np.empty((1, m)),
-        np.empty((1, m), np.bool_), np.empty((1, m, k)), np.empty((1, n, k)),
+        np.empty((1, m)), np.empty((1, m), np.int64), np.empty((1, m), np.bool_), np.empty((1, m, k)),
+        np.empty((1, n, k)), np.empty((1, m, arrays.before.shape[2]), np.bool_),
         np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.bool_),
     )  # fmt: skip
     for b in range(batch):
@@ -381,11 +511,14 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
                     act(arrays, state, 0, i, action)
             s += 1
         if rule == ALLOWED:
-            for i in range(m):
-                act(arrays, state, 0, i, n)
+            close(arrays, state, 0)
         result.rule[b] = rule
         result.satisfaction[b], result.distance[b] = state.satisfaction[0], state.distance[0]
-        result.reward[b] = state.satisfaction[0] - arrays.weight[problem[b]] * state.distance[0]
+        result.reward[b] = state.satisfaction[0] - arrays.terms[problem[b]].weight * state.distance[0]
+        result.makespan[b] = makespan_of(arrays, state, 0)
+        result.changes[b] = changes_of(arrays, state, 0)
+        if has_closing_cost(arrays, problem[b]):
+            result.reward[b] -= closing_cost(arrays, problem[b], result.makespan[b], result.changes[b])
     return result
 
 

@@ -16,25 +16,35 @@ import numpy as np
 
 from app.domain.allocation import Relaxation, Unmet, UnmetCode
 from app.domain.problem import Problem
-from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
 from app.simulation.insertion import new_trial
+from app.simulation.legs import UNREACHABLE
 from app.simulation.openings import (
     AS_IS,
-    NONE,
     Lookout,
     Places,
     Start,
+    direct_rule,
     look_from_start,
+    needs_of,
 )
 from app.simulation.planned_insertion import new_planned_trial
 from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.unmet_wording import Wording
-from app.simulation.visit import is_late
+from app.simulation.visit import COMMITTED_ELSEWHERE, HOME_TOO_LATE, TOO_LONG_ALOFT, farthest, is_late
 
 _RELAXED = (STEP, RANGE, TIME, STEP + RANGE, STEP + TIME, RANGE + TIME, STEP + RANGE + TIME)
 """What a visit may lack, fewest things first."""
+
+
+_BLOCKED = {
+    TOO_LONG_ALOFT: UnmetCode.ENDURANCE,
+    HOME_TOO_LATE: UnmetCode.AVAILABLE_UNTIL,
+    COMMITTED_ELSEWHERE: UnmetCode.COMMITTED,
+}
+"""Codes of the rules that forbid a visit whatever range, time and steps there are."""
 
 
 def unmet_targets(
@@ -63,8 +73,8 @@ def unmet_targets(
     open_targets = np.flatnonzero(plan.remaining.max(axis=1) > 0)
     if not len(open_targets):
         return ()
-    share = plan.remaining[open_targets].sum(axis=1) / arrays.need_total[0, open_targets]
-    urgent = open_targets[np.argsort(-arrays.level[0, open_targets] * share, kind="stable")]
+    share = plan.remaining[open_targets].sum(axis=1) / arrays.areas["need_total"][0, open_targets]
+    urgent = open_targets[np.argsort(-arrays.areas["level"][0, open_targets] * share, kind="stable")]
     scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
     start = look_from_start(arrays, plan, open_targets)
     lookout = Lookout(arrays, plan, *scratch, hurry)
@@ -130,14 +140,55 @@ class _Evaluator:
             return UnmetCode.NO_SUPPLY, self._says.no_supply(), None
         if fastest == NONE:
             missing = float(self._start.missing[j])
+            if missing >= UNREACHABLE / 2:
+                return self._barred(j)
             least = _Remedy(carrier, 0, relaxation_for(self._problem, more_range=missing))
             return UnmetCode.OUT_OF_RANGE, self._says.out_of_range(carrier, missing), least
-        arrival, deadline = float(self._start.arrival[j]), float(self._arrays.deadline[0, j])
+        arrival, deadline = float(self._start.arrival[j]), float(self._arrays.areas["deadline"][0, j])
         if is_late(arrival, deadline):
             late = arrival - deadline
             least = _Remedy(fastest, 0, relaxation_for(self._problem, late={j: late}))
             return UnmetCode.DEADLINE, self._says.deadline(fastest, late), least
+        if self._start.able[j] == NONE:
+            return self._too_long(fastest, j)
         return None
+
+    def _barred(self, j: int) -> tuple[UnmetCode, str, _Remedy | None]:
+        """Why no UAV that carries what target `j` needs may, or can, fly there."""
+        problem, target = self._problem, self._problem.targets[j]
+        carriers = [i for i in range(problem.n_uavs) if self._carries(i, j)]
+        allowed = [i for i in carriers if target.id not in problem.uavs[i].excluded]
+        skilled = [i for i in allowed if set(target.skills) <= set(problem.uavs[i].skills)]
+        if not allowed:
+            return UnmetCode.EXCLUDED, self._says.excluded(carriers), None
+        if not skilled:
+            lacked = set(target.skills).difference(*(problem.uavs[i].skills for i in allowed[:1]))
+            return UnmetCode.SKILLS, self._says.skills(allowed[0], sorted(lacked)), None
+        if problem.no_fly_zones and (problem.wind is None or self._is_cut_off(j)):
+            return UnmetCode.NO_FLY_ZONE, self._says.no_fly_zone(), None
+        if problem.wind is not None:
+            return UnmetCode.WIND, self._says.wind(skilled[0]), None
+        return UnmetCode.OUT_OF_RANGE, self._says.no_leg(), None
+
+    def _carries(self, i: int, j: int) -> bool:
+        """Whether UAV `i` can be sent and carries, at first, what target `j` still needs at the end."""
+        useful = (self._arrays.load[0, i] > 0) & (self._plan.remaining[j] > 0)
+        return bool(useful.any() and not self._arrays.ret[0, i])
+
+    def _is_cut_off(self, j: int) -> bool:
+        """Whether no leg at all leads to target `j`: then it is not the wind alone."""
+        others = np.arange(self._arrays.shape[1]) != j
+        into = self._arrays.between[0][:, others, j]
+        return bool((self._arrays.start_target[0, :, j] >= UNREACHABLE).all() and (into >= UNREACHABLE).all())
+
+    def _too_long(self, i: int, j: int) -> tuple[UnmetCode, str, _Remedy | None]:
+        """Why UAV `i`, the first that could be there, may not fly to target `j` in spite of that."""
+        needs = needs_of(self._arrays, i, j)
+        if int(direct_rule(self._arrays, i, j)) == HOME_TOO_LATE:
+            return UnmetCode.AVAILABLE_UNTIL, self._says.available_until(i, needs.landing), None
+        if needs.aloft - needs.waiting <= farthest(float(self._arrays.uavs["endurance"][0, i])):
+            return UnmetCode.TOO_EARLY_TO_WAIT, self._says.too_early_to_wait(i, j, needs), None
+        return UnmetCode.ENDURANCE, self._says.endurance(i, needs.aloft), None
 
     def _of_any_plan(
         self, j: int, code: UnmetCode, says: str, least: _Remedy | None, places: Places
@@ -178,7 +229,11 @@ class _Evaluator:
                 return self._unmet(j, code, says, remedy, outcome)
         code, says = UnmetCode.LOADS_USED, self._says.loads_used(None if now is None else now.gain)
         uav = None
-        if places.left_over[0]:
+        possible = (places.uav[:AS_IS] != NONE).any()
+        if places.left_over[0] and not possible and places.blocked[0] != NONE:
+            uav, place, rule = places.blocked.tolist()
+            code, says = _BLOCKED.get(rule, UnmetCode.OUT_OF_RANGE), self._says.blocked(uav, place, rule)
+        elif places.left_over[0] and possible:
             lack = max((0, *_RELAXED), key=lambda lack: float(places.gain[lack]))
             uav, place, gain = int(places.uav[lack]), int(places.place[lack]), float(places.gain[lack])
             code, says = UnmetCode.NOT_WORTH_IT, self._says.not_worth_it(uav, place, gain, lack)

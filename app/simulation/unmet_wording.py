@@ -5,7 +5,9 @@ from __future__ import annotations
 from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.flown_plan import FlownPlan
+from app.simulation.openings import DirectNeeds
 from app.simulation.shortfalls import RANGE, STEP, TIME
+from app.simulation.visit import RULES
 
 _MOST_NAMED = 4
 """Materials of which a sentence has the amounts; `remaining` has all of them."""
@@ -43,6 +45,61 @@ class Wording:
         if all(uav.ret for uav in self._problem.uavs):
             return "every UAV is returning"
         return "no UAV that can be sent carries any of it"
+
+    def excluded(self, carriers: list[int]) -> str:
+        """Nobody who carries it may be sent."""
+        return f"it is excluded for every UAV that carries any of it ({self._some(carriers)})"
+
+    def skills(self, i: int, lacked: list[str]) -> str:
+        """Nobody who carries it has the skills; one of them is UAV `i`."""
+        return f"no UAV that carries any of it has the skills: {self._uav(i)} lacks {', '.join(lacked)}"
+
+    def no_fly_zone(self) -> str:
+        """No way there, or home."""
+        return "no way leads there, or home from there, round the no-fly zones"
+
+    def wind(self, i: int) -> str:
+        """The wind is too strong; UAV `i` carries it."""
+        wind, uav = self._problem.wind, self._problem.uavs[i]
+        strength = 0.0 if wind is None else wind.speed
+        return (
+            f"a wind of {strength:.6g} is too strong to fly there and home from there at the speed of "
+            f"{self._uav(i)}, {uav.speed:.6g}"
+        )
+
+    def no_leg(self) -> str:
+        """The matrices have no leg."""
+        return "the matrices have no leg there, or home from there, for any UAV that carries any of it"
+
+    def endurance(self, i: int, needed: float) -> str:
+        """Too long in the air, even directly."""
+        return f"{self._uav(i)} would be in the air for {needed:.6g}, and has {self._usable(i):.6g}"
+
+    def too_early_to_wait(self, i: int, j: int, needs: DirectNeeds) -> str:
+        """It opens too late to wait for."""
+        opens = self._problem.targets[j].earliest
+        return (
+            f"it opens at {opens:.6g}: {self._uav(i)} would be in the air for {needs.aloft:.6g}, "
+            f"{needs.waiting:.6g} of it waiting, and has {self._usable(i):.6g}"
+        )
+
+    def available_until(self, i: int, landing: float) -> str:
+        """It would land too late, even directly."""
+        until = self._problem.uavs[i].available_until
+        return f"{self._uav(i)} would land at {landing:.6g}, and is available until {until or 0.0:.6g}"
+
+    def blocked(self, i: int, place: int, rule: int) -> str:
+        """A UAV with something left over must not fly there, whatever range, time and steps it has."""
+        where = self._where(i, place)
+        return f"{self._uav(i)} has some of it left over; a visit {where} is not allowed: {RULES[rule]}"
+
+    def _usable(self, i: int) -> float:
+        uav = self._problem.uavs[i]
+        return (uav.endurance or 0.0) * (1.0 - uav.reserve)
+
+    def _some(self, uavs: list[int]) -> str:
+        named = ", ".join(self._uav(i) for i in uavs[:_MOST_NAMED])
+        return named if len(uavs) <= _MOST_NAMED else f"{named} and {len(uavs) - _MOST_NAMED} more"
 
     def out_of_range(self, i: int, lacks: float) -> str:
         """Nobody has the range; UAV `i` comes closest."""

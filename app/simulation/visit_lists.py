@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from app.simulation import simulator
-from app.simulation.arrays import Integers
-from app.simulation.deliveries import NONE, Unloading, Visits
+from app.simulation.arrays import NONE, Integers
+from app.simulation.deliveries import Unloading, Visits
 from app.simulation.insertion import CHANGED, MARK
 
 

@@ -1,4 +1,4 @@
-"""What no answer is worse than, whatever the algorithm: staying at home, and the greedy rule."""
+"""What no answer is worse than: staying at home, the request's own plan, and the greedy rule."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from app.solvers.protocol import (
     Solver,
     StopCriterion,
 )
+from app.solvers.start import own_plan
 
 
 def nothing_to_fly(problem: Problem) -> bool:
@@ -31,7 +32,7 @@ class Floor:
     """A :class:`~app.solvers.protocol.Solver` whose answers, and what it tells, never fall below a floor.
 
     Where the algorithm's own plan earns less, the plan of the floor is the answer, and ``answered_by`` says
-    so if it is the greedy rule's. The history stays the algorithm's.
+    so if it is the greedy rule's, or the ``start_plan`` of the problem. The history stays the algorithm's.
 
     Parameters
     ----------
@@ -57,6 +58,9 @@ class Floor:
             report(Progress(1.0, 0, reward, plan))
             return Solution(plan, History([0], [reward]), self._parameters, proof=Proof(reward, True))
         answered_by = None
+        own = own_plan(problem)
+        if own is not None and own[1] > reward:
+            plan, reward, answered_by = *own, "start_plan"
         if self._greedy:
             by_rule = greedy_plan(problem, stop)
             earned = reward_of(problem, by_rule)

@@ -1,10 +1,10 @@
 """The paper's genetic algorithm (section 5.2.2, Table 2) on the compiled simulator.
 
 The paper gives its parameters and no operators. Here a chromosome holds, for every UAV, an ordered list of
-S targets. It is decoded through the simulator: at each step a UAV takes the first entry left in its list that
-is allowed at that moment, and flies home when the list is used up or says so; every chromosome is a legal
-plan. Parents are chosen by binary tournaments, a child takes each UAV's whole list from either parent, each
-gene may be redrawn, and the best chromosome survives.
+S targets. It is decoded through the simulator: at each step a UAV makes the visit that it is committed to,
+or takes the first entry left in its list that is allowed at that moment, and flies home when the list is
+used up or says so; every chromosome is a legal plan. Parents are chosen by binary tournaments, a child takes
+each UAV's whole list from either parent, each gene may be redrawn, and the best chromosome survives.
 """
 
 from __future__ import annotations
@@ -18,7 +18,16 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, compiled, new_episodes, reset_one, verdict
+from app.simulation.simulator import (
+    Episodes,
+    act,
+    close,
+    compiled,
+    new_episodes,
+    promised,
+    reset_one,
+    verdict,
+)
 from app.simulation.visit import ALLOWED
 from app.solvers.parameters import GeneticParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
@@ -118,7 +127,7 @@ def _begin(
     stop: StopCriterion,
 ) -> bool:
     """Draw and fly the first generation; False if it was stopped, then at least the first has flown."""
-    home = flight.arrays.level.shape[1]
+    home = flight.arrays.areas["level"].shape[1]
     for first, last in slices:
         if first > 0 and stop():
             return False
@@ -176,7 +185,7 @@ def decode(flight: Flight, genes: Integers) -> float:
         (S, M); column i is UAV i's list of targets, N ends it.
     """
     arrays, episodes = flight.arrays, flight.episodes
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     steps, m = genes.shape
     reset_one(arrays, episodes, 0)
     reward = 0.0
@@ -184,8 +193,8 @@ def decode(flight: Flight, genes: Integers) -> float:
         flight.cursor[i] = 0
     for s in range(steps):
         for i in range(m):
-            action = home
-            while flight.cursor[i] < steps:
+            action = promised(arrays, episodes, 0, i)
+            while action == home and flight.cursor[i] < steps:
                 gene = genes[flight.cursor[i], i]
                 flight.cursor[i] += 1
                 if gene == home or verdict(arrays, episodes, 0, i, gene) == ALLOWED:
@@ -193,9 +202,7 @@ def decode(flight: Flight, genes: Integers) -> float:
                     break
             flight.actions[s, i] = action
             reward += act(arrays, episodes, 0, i, action)
-    for i in range(m):
-        reward += act(arrays, episodes, 0, i, home)
-    return reward
+    return reward + close(arrays, episodes, 0)
 
 
 @njit(cache=True, error_model="numpy")
@@ -267,7 +274,7 @@ def breed(
     """
     crossover_rate, mutation_rate = rates
     _, steps, m = population.shape
-    home = flight.arrays.level.shape[1]
+    home = flight.arrays.need.shape[1]
     if first == 0:
         best = fittest(fitness)
         children[0], child_fitness[0] = population[best], fitness[best]

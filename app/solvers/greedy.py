@@ -16,13 +16,14 @@ from app.simulation.simulator import (
     Episodes,
     act,
     compiled,
+    earned_now,
     end_step,
     leg_home,
     leg_to,
     new_episodes,
     verdict,
 )
-from app.simulation.visit import ALLOWED, cost_of, earned_by, way_home
+from app.simulation.visit import ALLOWED, cost_of, most_earned_by, way_home
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.stop import never
@@ -81,7 +82,7 @@ def _take_turns(
 
     `turn` has the step and the UAV whose turn is next, `left` the sum of what each target still needs, (N,).
     """
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     for _ in range(turns):
         s, i = turn[0], turn[1]
         chosen = _best_visit(arrays, episodes, left, i)
@@ -100,28 +101,28 @@ def _take_turns(
 @compiled
 def _best_visit(arrays: ProblemArrays, episodes: Episodes, left: Floats, i: int) -> int:
     """Return the target whose visit earns most for UAV `i` now; N where none earns anything."""
-    best, chosen = 0.0, arrays.level.shape[1]
+    best, chosen = 0.0, arrays.need.shape[1]
     if episodes.ret[0, i]:
         return chosen
     carried = episodes.load[0, i].sum()
-    back = leg_home(arrays, episodes, 0, i) if arrays.charge_return[0] else 0.0
-    for j in range(arrays.level.shape[1]):
+    back = leg_home(arrays, episodes, 0, i) if arrays.terms[0].charge_return else 0.0
+    for j in range(arrays.need.shape[1]):
         # What it earns at most is known at once, and mostly too little; the margin is for rounding errors.
         most = min(carried, left[j]) * (1.0 + _ROUNDING)
         if most <= 0.0:
             continue
         way = leg_to(arrays, episodes, 0, i, j)
-        if arrays.charge_return[0]:
+        if arrays.terms[0].charge_return:
             way += way_home(arrays, 0, i, j) - back
         cost = cost_of(arrays, 0, way)
-        if earned_by(arrays, 0, j, most) - cost <= best:
+        if most_earned_by(arrays, 0, j, most) - cost <= best:
             continue
         if verdict(arrays, episodes, 0, i, j) != ALLOWED:
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
             unloaded += min(episodes.load[0, i, k], episodes.need[0, j, k])
-        gain = earned_by(arrays, 0, j, unloaded)
+        gain = earned_now(arrays, episodes, 0, i, j, unloaded)
         earned = gain - cost
         # Of equals the first, whatever rounding makes of them.
         if earned > best + _ROUNDING * gain:

@@ -19,7 +19,9 @@ def common_level(arrays: ProblemArrays) -> float:
 
     One area of a very large level among small ones would otherwise be the only one that counts.
     """
-    levels = arrays.level[0][(arrays.need_total[0] > 0) & (arrays.level[0] > _NOTHING)]
+    levels = arrays.areas["level"][0][
+        (arrays.areas["need_total"][0] > 0) & (arrays.areas["level"][0] > _NOTHING)
+    ]
     if not len(levels):
         return largest_level(arrays)
     return min(largest_level(arrays), _TYPICAL * float(np.exp(np.log(levels).mean())))
@@ -30,5 +32,5 @@ def largest_level(arrays: ProblemArrays) -> float:
 
     It is never 0: where no target has a level, 1 stands for it.
     """
-    level = float(arrays.level[0][arrays.need_total[0] > 0].max(initial=0.0))
+    level = float(arrays.areas["level"][0][arrays.areas["need_total"][0] > 0].max(initial=0.0))
     return level if level > _NOTHING else 1.0

@@ -10,7 +10,14 @@ import numpy as np
 import torch
 from numba import njit
 
-from app.learning.universal.episodes.observation import FORBIDDEN, look, look_again, new_gains, observe
+from app.learning.universal.episodes.observation import (
+    FORBIDDEN,
+    look,
+    look_again,
+    nearness,
+    new_gains,
+    observe,
+)
 from app.learning.universal.episodes.rollout import Played
 from app.learning.universal.episodes.turns import Turns
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -45,7 +52,7 @@ def play_at_once(agent, arrays, problem, rng=None):
     episodes, gains = new_episodes(arrays, batch, problem), new_gains(arrays, batch)
     look(arrays, episodes, gains)
     plans, rewards = np.full((batch, steps, m), n, np.int64), np.zeros(batch)
-    scaled = torch.from_numpy((arrays.between / gains.extent[:, None, None]).astype(np.float32))
+    scaled = torch.from_numpy(nearness(arrays, gains.span))
     bias, hidden = agent.bias(scaled), torch.zeros(m, batch, agent.home.shape[0])
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)

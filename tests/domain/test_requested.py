@@ -144,7 +144,7 @@ def test_a_met_area_needs_nothing_and_does_not_set_the_scale():
         requested=(1.0,) * began.n_materials,
     )
     arrays = compile_problem(Problem(began.uavs, (met, *began.targets[1:])))
-    assert (arrays.need_total[0, 0], arrays.level[0, 0]) == (0.0, 0.0)
+    assert (arrays.areas["need_total"][0, 0], arrays.areas["level"][0, 0]) == (0.0, 0.0)
 
 
 def test_a_need_that_is_rounding_of_what_was_requested_is_none():
@@ -155,4 +155,6 @@ def test_a_need_that_is_rounding_of_what_was_requested_is_none():
         requested=(100.0,) * began.n_materials,
     )
     assert crumb.need == (0.0,) * began.n_materials
-    assert compile_problem(replace(began, targets=(crumb, *began.targets[1:]))).need_total[0, 0] == 0.0
+    assert (
+        compile_problem(replace(began, targets=(crumb, *began.targets[1:]))).areas["need_total"][0, 0] == 0.0
+    )

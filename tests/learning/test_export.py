@@ -18,7 +18,14 @@ from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import Actor
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
-from app.learning.universal.episodes.observation import look, look_again, new_gains, observe, scales
+from app.learning.universal.episodes.observation import (
+    look,
+    look_again,
+    nearness,
+    new_gains,
+    observe,
+    scales,
+)
 from app.learning.universal.episodes.rollout import play
 from app.learning.universal.network.architecture import (
     OWN_FEATURES,
@@ -76,7 +83,7 @@ def fly(session, policy, problem):
     episodes, gains = new_episodes(arrays, 1), new_gains(arrays, 1)
     look(arrays, episodes, gains)
     hidden = [np.zeros((1, policy.config.width), np.float32)] * m
-    distances = (arrays.between[0] / scales(arrays)[0][0]).astype(np.float32)
+    distances = nearness(arrays, scales(arrays)[0])[0]
     plan = np.full((problem.max_steps, m), n)
     for step in range(problem.max_steps):
         if episodes.done[0]:

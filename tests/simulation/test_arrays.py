@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.domain.problem import Wind
 from app.simulation.arrays import AXES, OF_UAVS, alike, compile_problem, part, stack
 from app.simulation.generator import generate
 
@@ -17,35 +18,75 @@ def problem():
     return replace(made, objective=replace(made.objective, distance_weight=0.5))
 
 
-def test_fields_have_the_axes_that_are_declared(problem):
-    arrays = compile_problem(problem)
+@pytest.fixture
+def windy(problem):
+    """A problem in which every array has entries; its UAVs have two speeds."""
+    uavs = [replace(uav, speed=1.0 + (i % 2), endurance=9.0) for i, uav in enumerate(problem.uavs)]
+    ids = [target.id for target in problem.targets]
+    uavs[0] = replace(uavs[0], committed=(ids[4], ids[1]))
+    return replace(
+        problem,
+        uavs=tuple(uavs),
+        wind=Wind(0.2, 30.0),
+        start_plan=((4, 0, 1, 2), (1, 6, 6, 6)),
+        objective=replace(problem.objective, change_weight=0.1, minimum_share=0.5, minimum_weight=2.0),
+    )
+
+
+@pytest.mark.parametrize("which", ["problem", "windy"])
+def test_fields_have_the_axes_that_are_declared(which, request):
+    given = request.getfixturevalue(which)
+    arrays = compile_problem(given)
+    sizes = {**SIZES, "C": len({uav.speed for uav in given.uavs}) if given.wind else 1}
     for name, axes in AXES.items():
-        assert getattr(arrays, name).shape == (1, *(SIZES[axis] for axis in axes.names)), name
+        shape = getattr(arrays, name).shape
+        declared = tuple(sizes[axis] for axis in axes.names if axis != "X")
+        assert shape[0] == 1
+        assert len(shape) == 1 + len(axes.names)
+        # Where times follow from lengths there are none, and lists of visits may be empty.
+        assert shape[1 : 1 + len(declared)] == declared or not getattr(arrays, name).size, name
 
 
-def test_a_part_is_what_its_own_problem_compiles_to(problem):
+@pytest.mark.parametrize("which", ["problem", "windy"])
+def test_a_part_is_what_its_own_problem_compiles_to(which, request):
+    problem = request.getfixturevalue(which)
     uavs, targets = [2, 0], [4, 1, 3]
     smaller = replace(
         problem,
+        start_plan=((1, 0), (3, 1)) if problem.start_plan else None,
         uavs=tuple(problem.uavs[i] for i in uavs),
         targets=tuple(problem.targets[j] for j in targets),
     )
     parts = part(compile_problem(problem), np.array([uavs, [1, 3]]), np.array([targets, [0, 2, 5]]))
     expected = compile_problem(smaller)
     for name in AXES:
-        if name != "crumb":  # a share of the largest amount of the whole problem
-            assert np.array_equal(getattr(parts, name)[0], getattr(expected, name)[0]), name
-            assert getattr(parts, name).flags.c_contiguous
+        found, wanted = getattr(parts, name)[0].copy(), getattr(expected, name)[0].copy()
+        if name == "terms":  # a share of the largest amount of the whole problem
+            found["crumb"] = wanted["crumb"]
+        assert np.array_equal(found, wanted), name
+        assert getattr(parts, name).flags.c_contiguous
 
 
-def test_uavs_that_differ_in_anything_are_not_alike(problem):
-    twins = replace(problem, uavs=(problem.uavs[0], replace(problem.uavs[0], id="twin"), *problem.uavs[2:]))
+def test_uavs_that_differ_in_anything_are_not_alike(windy):
+    problem = replace(
+        windy, uavs=tuple(replace(uav, speed=1.0 + (i > 1)) for i, uav in enumerate(windy.uavs))
+    )
+    twins = replace(
+        problem,
+        uavs=(problem.uavs[0], replace(problem.uavs[0], id="twin"), *problem.uavs[2:]),
+        start_plan=((4, 4, 1, 2), (1, 1, 6, 6)),
+    )
     arrays = compile_problem(twins)
     assert alike(arrays).tolist() == [0, 0, 2, 3]
     for name in OF_UAVS:
-        changed = getattr(arrays, name).copy()
-        changed[0, 1] = ~changed[0, 1] if changed.dtype == bool else changed[0, 1] + 1.0
-        assert alike(arrays._replace(**{name: changed})).tolist() == [0, 1, 2, 3], name
+        for column in getattr(arrays, name).dtype.names or (None,):
+            changed = getattr(arrays, name).copy()
+            place = changed if column is None else changed[column]
+            if place.dtype == bool:
+                place[0, 1] = ~place[0, 1]
+            else:
+                place[0, 1] = np.where(np.isfinite(place[0, 1]), place[0, 1] + 1, 0)
+            assert alike(arrays._replace(**{name: changed})).tolist() == [0, 1, 2, 3], (name, column)
 
 
 def test_what_pads_a_stack_is_never_part_of_a_visit(problem):
@@ -54,4 +95,4 @@ def test_what_pads_a_stack_is_never_part_of_a_visit(problem):
     assert stacked.shape == tuple(SIZES.values())
     assert stacked.ret[1, 1:].all()
     assert not stacked.need[1, 2:].any()
-    assert np.isinf(stacked.deadline[1, 2:]).all()
+    assert np.isinf(stacked.areas["deadline"][1, 2:]).all()

@@ -82,6 +82,20 @@ def test_one_more_load_would_do():
     assert found.reward_change == pytest.approx(0.5)
 
 
+FIRST_EDITION = {
+    UnmetCode.NO_SUPPLY,
+    UnmetCode.OUT_OF_RANGE,
+    UnmetCode.DEADLINE,
+    UnmetCode.STEP_LIMIT,
+    UnmetCode.RANGE_USED,
+    UnmetCode.TIME_USED,
+    UnmetCode.LOADS_USED,
+    UnmetCode.NOT_WORTH_IT,
+    UnmetCode.NOT_CHOSEN,
+}
+"""Reasons of problems without waiting, zones, wind, skills and other limits."""
+
+
 def record(case, answer):
     """Problem and answer as a client has them."""
     problem, told = problem_to_record(case), to_record(answer)
@@ -114,7 +128,7 @@ def test_no_single_visit_contradicts_a_reason_and_every_remedy_works(unloading, 
         assert all(each["verified"] for each in unmet)
         codes.update(each["code"] for each in unmet)
     rare = {UnmetCode.RANGE_USED, UnmetCode.TIME_USED}
-    assert codes >= (set(UnmetCode) if unloading == "greedy" else set(UnmetCode) - rare)
+    assert codes >= (FIRST_EDITION if unloading == "greedy" else FIRST_EDITION - rare)
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("reason-false-*.json")))

@@ -95,8 +95,8 @@ def test_no_plan_exceeds_the_bound(variant, seed):
     problem = problem_of(variant, seed, n=5, steps=3)
     arrays = compile_problem(problem)
     routes = [[(frozenset(), None), *legal_routes(problem, i).items()] for i in range(problem.n_uavs)]
-    levels, weight = arrays.level[0], float(arrays.weight[0])
-    idle = float(arrays.start_home[0, 0]) * bool(arrays.charge_return[0])
+    levels, weight = arrays.areas["level"][0], float(arrays.terms["weight"][0])
+    idle = float(arrays.uavs["start_home"][0, 0]) * bool(arrays.terms["charge_return"][0])
     best = max(
         sum(levels[j] for j in frozenset().union(*(targets for targets, _ in plan)))
         - weight * sum(idle if distance is None else distance for _, distance in plan)

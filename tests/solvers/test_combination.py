@@ -47,9 +47,11 @@ def put(arrays, pool, i, targets):
     """Offer a route to a pool."""
     flown, at = [0.0], None
     for j in targets:
-        flown.append(flown[-1] + (arrays.start_target[0, i, j] if at is None else arrays.between[0, at, j]))
+        flown.append(
+            flown[-1] + (arrays.start_target[0, i, j] if at is None else arrays.between[0, 0, at, j])
+        )
         at = j
-    collect(arrays, pool, i, np.array(targets), len(targets), np.array(flown) + arrays.dis[0, i])
+    collect(arrays, pool, i, np.array(targets), len(targets), np.array(flown) + arrays.uavs["dis"][0, i])
 
 
 def test_only_whole_routes_are_collected():
@@ -73,7 +75,7 @@ def test_of_the_orders_of_a_set_the_shortest_is_kept_for_each_kind():
             put(arrays, pool, i, targets)
     kept = routes_of(pool)
     assert sorted(uav for uav, _, _ in kept) == [0, 1]
-    legs = arrays.start_target[0, 0], arrays.between[0]
+    legs = arrays.start_target[0, 0], arrays.between[0, 0]
     lengths = [
         legs[0][a] + legs[1][a, b] + legs[1][b, c] for a, b, c in ([0, 1, 2], [1, 0, 2], [2, 1, 0], [0, 2, 1])
     ]
@@ -128,9 +130,9 @@ def test_the_next_reward_follows_from_the_steps_of_the_levels(levels, weight, re
 def best_of_all_choices(arrays, pool):
     """Every choice of at most one route a UAV, and what it earns; and the most that each route is part of."""
     routes = routes_of(pool)
-    weight, level = float(arrays.weight[0]), arrays.level[0]
+    weight, level = float(arrays.terms["weight"][0]), arrays.areas["level"][0]
     room = np.bincount(pool.kind)
-    idle = weight * arrays.start_home[0] * arrays.charge_return[0]
+    idle = weight * arrays.uavs["start_home"][0] * arrays.terms["charge_return"][0]
     best, with_route = -idle.sum(), np.full(len(routes), -np.inf)
     for count in range(1, arrays.shape[0] + 1):
         for chosen in combinations(range(len(routes)), count):
@@ -174,7 +176,7 @@ def test_without_routes_everybody_stays_and_everything_is_worth_its_level(weight
     arrays = compile_problem(problem)
     relaxed = Packing(arrays, new_pool(arrays)).relax()
     assert relaxed.reward == pytest.approx(float(new_search(arrays).best[0]))
-    np.testing.assert_allclose(relaxed.price, arrays.level[0])
+    np.testing.assert_allclose(relaxed.price, arrays.areas["level"][0])
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.3])

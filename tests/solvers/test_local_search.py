@@ -20,7 +20,7 @@ from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
 from app.solvers.local_search.ceiling import most_satisfaction
-from app.solvers.local_search.change import apply, extra_distance, feasible, undo
+from app.solvers.local_search.change import apply, extra_closing, extra_distance, feasible, undo
 from app.solvers.local_search.effort import default_moves, default_restarts
 from app.solvers.local_search.improvement import Cooling, improve
 from app.solvers.local_search.moves import draw_move
@@ -42,7 +42,7 @@ def solve(problem, *, seed=1, stop=never, report=quiet, **parameters):
 
 def current_actions(search):
     """The current plan, not the incumbent, as joint actions (S, M)."""
-    routes, home = search.routes, search.arrays.level.shape[1]
+    routes, home = search.routes, search.arrays.areas["level"].shape[1]
     used = np.arange(routes.target.shape[1])[None, :] < routes.length[:, None]
     return np.where(used, routes.target, home).T.copy()
 
@@ -84,7 +84,8 @@ def test_totals_stay_those_of_the_simulator_through_random_moves():
             if not feasible(search.arrays, search.change):
                 continue
             extra = extra_distance(search.arrays, search.routes, search.change)
-            apply(search.arrays, search.routes, search.change, extra)
+            closing = extra_closing(search.arrays, search.routes, search.change)
+            apply(search.arrays, search.routes, search.change, extra, closing)
             applied += 1
             if rng.random() < 0.4:
                 undo(search.routes, search.change)
@@ -110,6 +111,7 @@ def test_undoing_leaves_no_trace():
                 search.routes,
                 search.change,
                 extra_distance(search.arrays, search.routes, search.change),
+                extra_closing(search.arrays, search.routes, search.change),
             )
             if rng.random() < 0.3:
                 continue
@@ -129,7 +131,7 @@ def test_undoing_leaves_no_trace():
 def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
-        scale = max(float(search.arrays.level.max()), 1e-9)
+        scale = max(float(search.arrays.areas["level"].max()), 1e-9)
         anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0)
         assert_evaluated(search)
         assert search.routes.total[SATISFACTION] <= search.most

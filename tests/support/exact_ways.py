@@ -16,9 +16,13 @@ Point = tuple[Fraction, Fraction]
 
 
 class ExactWays:
-    """Ways round zones that are given by corners with rational coordinates; no two sides of one cross."""
+    """Ways round zones that are given by corners with rational coordinates; no two sides of one cross.
 
-    def __init__(self, zones):
+    `measure` is the length of a straight piece, where that is not what it is on this plane.
+    """
+
+    def __init__(self, zones, measure=math.dist):
+        self.measure = measure
         self.zones = [[exact(corner) for corner in zone] for zone in zones]
         self.edges = [edge for zone in self.zones for edge in zip(zone, zone[1:] + zone[:1], strict=True)]
         self.corners = sorted({corner for zone in self.zones for corner in zone})
@@ -26,30 +30,35 @@ class ExactWays:
 
     def length(self, a, b):
         """Length of the shortest way; infinite where there is none."""
+        return self.way(a, b)[0]
+
+    def way(self, a, b):
+        """Length of the shortest way, and its points; infinite and None where there is none."""
         a, b = exact(a), exact(b)
         if self.inside(a) or self.inside(b):
-            return math.inf
+            return math.inf, None
         if a == b or self.free(a, b):
-            return math.dist(a, b)
-        best = {}
-        heap = [(math.dist(a, c), a, c) for c in self.corners if c != a and self.free(a, c)]
+            return self.measure(a, b), (a, b)
+        done = set()
+        heap = [(self.measure(a, c), (a, c)) for c in self.corners if c != a and self.free(a, c)]
         heapq.heapify(heap)
         while heap:
-            length, before, here = heapq.heappop(heap)
-            if (before, here) in best:
+            length, points = heapq.heappop(heap)
+            before, here = points[-2:]
+            if (before, here) in done:
                 continue
-            best[before, here] = length
+            done.add((before, here))
             if here == b:
-                return length
+                return length, points
             for onward in (b, *self.corners):
                 if (
                     onward not in (here, before)
-                    and (here, onward) not in best
+                    and (here, onward) not in done
                     and self.free(here, onward)
                     and self.may_pass(here, minus(before, here), minus(onward, here))
                 ):
-                    heapq.heappush(heap, (length + math.dist(here, onward), here, onward))
-        return math.inf
+                    heapq.heappush(heap, (length + self.measure(here, onward), (*points, onward)))
+        return math.inf, None
 
     def inside(self, point):
         """Whether a point lies in the interior of the union."""

@@ -5,7 +5,7 @@ It shares no code with the product: the tests hold the compiled simulator and ev
 
 from __future__ import annotations
 
-import math
+from referee_legs import Leg, Legs, apart, home_of, place_of, start_of
 
 TOLERANCE = 1e-6
 CRUMB = 1e-9
@@ -15,28 +15,14 @@ class Illegal(Exception):
     """The plan breaks a rule; the argument says which: (step, uav, rule), counted from 0."""
 
 
-def apart(crs, a, b):
-    """Distance on the plane, or by the haversine formula on a sphere of 6371.0088 km.
-
-    A place with two spellings is one: 180 and -180, and a pole with any longitude.
-    """
-    if crs == "local":
-        return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
-    if a[1] == b[1] and (abs(a[1]) == 90 or (a[0] - b[0]) % 360 == 0):
-        return 0.0
-    (lon_a, lat_a), (lon_b, lat_b) = ([math.radians(v) for v in point] for point in (a, b))
-    chord = (
-        math.sin((lat_b - lat_a) / 2) ** 2
-        + math.cos(lat_a) * math.cos(lat_b) * math.sin((lon_b - lon_a) / 2) ** 2
-    )
-    return 2 * 6371.0088 * math.asin(min(1.0, math.sqrt(chord)))
-
-
 def weight_of(problem):
     """λ: the objective's, or one over the diagonal of the bounding box, the narrowest one on the globe."""
     given = (problem.get("objective") or {}).get("distance_weight")
     if given is not None:
         return given
+    if problem.get("matrices"):
+        tables = [matrix["distance"] for matrix in problem["matrices"].values()]
+        return 1 / (max(leg or 0.0 for table in tables for row in table for leg in row) or 1.0)
     points = [(t["x"], t["y"]) for t in problem["targets"]]
     for uav in problem["uavs"]:
         points += [(uav["x_s"], uav["y_s"]), now(uav)]
@@ -60,14 +46,23 @@ class Aircraft:
     """One UAV on its way."""
 
     def __init__(self, record):
-        self.home = (record["x_s"], record["y_s"])
-        self.place = now(record)
+        self.record = record
+        self.home, self.place = home_of(record)[:2], now(record)
+        self.at = start_of(record)
         self.speed, self.voyage = record["speed"], record["voyage"]
         self.flown = record.get("dis") or 0.0
         self.out = not record.get("ret")
         self.loaded = [float(amount) for amount in record["loadlist"]]
         self.hold = list(self.loaded)
-        self.clock = 0.0
+        self.clock = record.get("available_from") or 0.0
+        self.aloft = record.get("airborne") or 0.0
+        self.on_ground = self.at == home_of(record) and not self.flown and not self.aloft
+        self.stops = []
+
+    def usable(self, name):
+        """What may be used of its range or endurance; infinite where there is no limit."""
+        whole = self.record.get(name)
+        return float("inf") if whole is None else whole * (1 - (self.record.get("reserve") or 0.0))
 
 
 def unloaded_by(craft, wanted, area, carried, given):
@@ -91,67 +86,152 @@ def without(amount, taken, whole):
     return left if left >= CRUMB * whole else 0.0
 
 
-def replay(problem, assignment, delivered=None):
+def first_part(before, share, objective):
+    """How much of a share that is delivered after another is of the first share, which earns more."""
+    first = objective.get("minimum_share") or 0.0
+    return max(0.0, min(before + share, first) - min(before, first))
+
+
+def latest(time):
+    """A time with the tolerance of its comparisons; infinite where there is none."""
+    return float("inf") if time is None else time + abs(time) * TOLERANCE
+
+
+class Replay:
+    """A plan that is being flown."""
+
+    def __init__(self, problem, legs=None):
+        self.problem, self.objective = problem, problem.get("objective") or {}
+        self.legs = legs or Legs(problem)
+        self.fleet = [Aircraft(record) for record in problem["uavs"]]
+        self.areas = problem["targets"]
+        self.asked = [
+            area["loadlist"] if area.get("requested") is None else area["requested"] for area in self.areas
+        ]
+        self.needs = [
+            [without(amount, 0.0, whole) for amount, whole in zip(area["loadlist"], row, strict=True)]
+            for area, row in zip(self.areas, self.asked, strict=True)
+        ]
+        self.satisfaction = self.distance = 0.0
+
+    def way_home(self, craft, at):
+        """The leg home; one of nothing where it need not return, None where it must and cannot."""
+        if not self.objective.get("return_to_base", True):
+            return Leg(0.0, 0.0, 0.0)
+        return self.legs.leg(craft.record, at, home_of(craft.record))
+
+    def land(self, craft):
+        """Fly home for good, which costs its length where that is charged."""
+        leg = self.legs.leg(craft.record, craft.at, home_of(craft.record))
+        if craft.out and self.objective.get("charge_return", False) and leg is not None:
+            self.distance += leg.ground
+        craft.out = False
+
+    def landed(self, craft):
+        """When it has landed, from where it is at the end of its visits."""
+        home = self.way_home(craft, craft.at)
+        return craft.clock + (home.time if home else 0.0)
+
+    def visit(self, s, i, j, given):
+        """Fly UAV `i` to area `j` in step `s`; raises Illegal."""
+        craft, area, wanted = self.fleet[i], self.areas[j], self.needs[j]
+        if not craft.out:
+            raise Illegal(s, i, "returning")
+        unloaded = unloaded_by(craft, wanted, area, self.problem["uavs"][i]["loadlist"], given)
+        if unloaded is None:
+            raise Illegal(s, i, "amount")
+        if not any(amount > 0 for amount in unloaded):
+            raise Illegal(s, i, "useless")
+        there = place_of(area)
+        leg, home = self.legs.leg(craft.record, craft.at, there), self.way_home(craft, there)
+        lacks = set(area.get("skills") or ()) - set(craft.record.get("skills") or ())
+        if leg is None or home is None or lacks or area.get("id") in (craft.record.get("excluded") or ()):
+            raise Illegal(s, i, "barred")
+        if craft.flown + leg.air + home.air > craft.usable("voyage") * (1 + TOLERANCE):
+            raise Illegal(s, i, "range")
+        arrival = craft.clock + leg.time
+        if arrival > latest(area.get("deadline")):
+            raise Illegal(s, i, "late")
+        committed = craft.record.get("committed") or ()
+        if len(craft.stops) < len(committed) and committed[len(craft.stops)] != area["id"]:
+            raise Illegal(s, i, "committed")
+        begin = max(arrival, area.get("earliest") or 0.0)
+        end = begin + (area.get("service_time") or 0.0)
+        waits_on_ground = craft.on_ground and not craft.stops
+        aloft = craft.aloft + (end - craft.clock) - (begin - arrival if waits_on_ground else 0.0)
+        if aloft + home.time > craft.usable("endurance") * (1 + TOLERANCE):
+            raise Illegal(s, i, "endurance")
+        if end + home.time > latest(craft.record.get("available_until")):
+            raise Illegal(s, i, "landing")
+        craft.clock, craft.flown, craft.aloft = end, craft.flown + leg.air, aloft
+        craft.at, craft.place = there, (area["x"], area["y"])
+        self.distance += leg.ground
+        self.unload(craft, j, unloaded, begin)
+        endurance = craft.record.get("endurance")
+        craft.stops.append(
+            {
+                "step": s + 1,
+                "target": j,
+                "arrival_time": arrival,
+                "begin_time": begin,
+                "departure_time": end,
+                "distance": leg.ground,
+                "delivered": unloaded,
+                "range_left": craft.voyage - craft.flown,
+                "endurance_left": None if endurance is None else endurance - aloft,
+            }
+        )
+
+    def unload(self, craft, j, unloaded, begin):
+        """Unload amounts at area `j`, and earn what that is worth then."""
+        area, wanted, asked = self.areas[j], self.needs[j], self.asked[j]
+        half_life = self.objective.get("half_life")
+        for k, amount in enumerate(unloaded):
+            if amount > 0:
+                first = first_part((asked[k] - wanted[k]) / asked[k], amount / asked[k], self.objective)
+                gained = amount + ((self.objective.get("minimum_weight") or 1.0) - 1.0) * first * asked[k]
+                worth = 1.0 if half_life is None else 2.0 ** (-begin / half_life)
+                self.satisfaction += area["level"] * gained / sum(asked) * worth
+            craft.hold[k] = without(craft.hold[k], amount, craft.loaded[k])
+            wanted[k] = without(wanted[k], amount, asked[k])
+
+
+def replay(problem, assignment, delivered=None, legs=None):
     """Reward, satisfaction, distance and remaining needs of a legal plan; raises Illegal otherwise.
 
     With planned unloading `delivered` says what every visit unloads: amounts by step, UAV and material.
+    `legs` are those of the problem, where they are known already.
     """
-    crs, objective = problem.get("crs", "local"), problem.get("objective") or {}
-    charge, must_return = objective.get("charge_return", False), objective.get("return_to_base", True)
-    fleet = [Aircraft(record) for record in problem["uavs"]]
-    areas = problem["targets"]
-    asked = [area["loadlist"] if area.get("requested") is None else area["requested"] for area in areas]
-    needs = [
-        [without(amount, 0.0, whole) for amount, whole in zip(area["loadlist"], row, strict=True)]
-        for area, row in zip(areas, asked, strict=True)
-    ]
-    totals = [sum(row) for row in asked]
-    weight = weight_of(problem)
-    satisfaction = distance = 0.0
+    flight, n = Replay(problem, legs), len(problem["targets"])
     if len(assignment) > problem.get("max_steps", 5):
         raise Illegal(0, 0, "steps")
+    visited = set()
     for s, row in enumerate(assignment):
-        for i, (craft, choice) in enumerate(zip(fleet, row, strict=True)):
-            if not 0 <= choice <= len(areas):
+        for i, (craft, choice) in enumerate(zip(flight.fleet, row, strict=True)):
+            if not 0 <= choice <= n:
                 raise Illegal(s, i, "action")
-            if choice == len(areas):
-                if craft.out and charge:
-                    distance += apart(crs, craft.place, craft.home)
-                craft.out = False
-                continue
-            if not craft.out:
-                raise Illegal(s, i, "returning")
-            area, wanted = areas[choice], needs[choice]
-            there = (area["x"], area["y"])
-            leg = apart(crs, craft.place, there)
-            given = None if delivered is None else delivered[s][i]
-            unloaded = unloaded_by(craft, wanted, area, problem["uavs"][i]["loadlist"], given)
-            if unloaded is None:
-                raise Illegal(s, i, "amount")
-            if not any(amount > 0 for amount in unloaded):
-                raise Illegal(s, i, "useless")
-            back = apart(crs, there, craft.home) if must_return else 0.0
-            if craft.flown + leg + back > craft.voyage * (1 + TOLERANCE):
-                raise Illegal(s, i, "range")
-            arrival = craft.clock + leg / craft.speed
-            latest = area.get("deadline")
-            if latest is not None and arrival > latest + abs(latest) * TOLERANCE:
-                raise Illegal(s, i, "late")
-            craft.clock = arrival + (area.get("service_time") or 0.0)
-            craft.flown += leg
-            distance += leg
-            craft.place = there
-            for k, amount in enumerate(unloaded):
-                craft.hold[k] = without(craft.hold[k], amount, craft.loaded[k])
-                wanted[k] = without(wanted[k], amount, asked[choice][k])
-                if amount > 0:
-                    satisfaction += area["level"] * amount / totals[choice]
-    if charge:
-        distance += sum(apart(crs, craft.place, craft.home) for craft in fleet if craft.out)
+            if choice == n:
+                flight.land(craft)
+            else:
+                flight.visit(s, i, choice, None if delivered is None else delivered[s][i])
+                visited.add((i, choice))
+    for craft in flight.fleet:
+        flight.land(craft)
+    before = {(i, j) for row in problem.get("start_plan") or () for i, j in enumerate(row) if j < n}
+    weight, objective = weight_of(problem), flight.objective
+    makespan = max((flight.landed(craft) for craft in flight.fleet if craft.stops), default=0.0)
+    changes = len(before - visited)
     return {
-        "reward": satisfaction - weight * distance,
-        "satisfaction": satisfaction,
-        "distance": distance,
+        "reward": flight.satisfaction
+        - weight * flight.distance
+        - (objective.get("makespan_weight") or 0.0) * makespan
+        - (objective.get("change_weight") or 0.0) * changes,
+        "satisfaction": flight.satisfaction,
+        "distance": flight.distance,
         "distance_weight": weight,
-        "remaining": needs,
+        "remaining": flight.needs,
+        "makespan": makespan,
+        "changes": changes,
+        "stops": [craft.stops for craft in flight.fleet],
+        "landed": [flight.landed(craft) for craft in flight.fleet],
     }

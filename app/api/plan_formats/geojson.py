@@ -1,4 +1,4 @@
-"""The whole plan as GeoJSON (RFC 7946): starting points, areas, a line a route, and zones."""
+"""The whole plan as GeoJSON (RFC 7946): starting points, areas, no-fly zones, and a line a route."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.api.plan_formats.antimeridian import closed, cut_line, cut_ring
-from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
 from app.domain.fields import declared_fields
 from app.domain.problem import UAV, NoFlyZone, Target
 from app.domain.records import item_to_record
@@ -16,7 +16,7 @@ MEDIA_TYPE = "application/geo+json"
 
 
 def geojson(plan: FlownPlan) -> str:
-    """Write a feature collection: a Point a UAV and an area, a LineString a UAV that flies, a Polygon a zone.
+    """Write a feature collection: a Point a UAV and an area, a Polygon a zone, a LineString a UAV that flies.
 
     The positions of a ``local`` problem are no longitudes and latitudes, which RFC 7946 has only by prior
     arrangement: the member ``coordinates`` says which they are. What crosses the antimeridian is cut there
@@ -25,8 +25,8 @@ def geojson(plan: FlownPlan) -> str:
     geographic = plan.problem.crs == "wgs84"
     features = [_start(route) for route in plan.routes]
     features += _areas(plan)
-    features += [_line(route, geographic=geographic) for route in plan.flying]
     features += [_zone(zone, geographic=geographic) for zone in plan.problem.no_fly_zones]
+    features += [_line(plan, route, geographic=geographic) for route in plan.flying]
     content = {
         "type": "FeatureCollection",
         "coordinates_are": "longitude and latitude in degrees (WGS 84)" if geographic else "x and y, local",
@@ -37,6 +37,7 @@ def geojson(plan: FlownPlan) -> str:
             "satisfaction": plan.satisfaction,
             "distance": plan.distance,
         },
+        **({"wind": item_to_record(plan.problem.wind)} if plan.problem.wind is not None else {}),
         "features": features,
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -74,19 +75,6 @@ def _areas(plan: FlownPlan) -> list[dict[str, Any]]:
     return features
 
 
-def _zone(zone: NoFlyZone, *, geographic: bool) -> dict[str, Any]:
-    rings = cut_ring(zone.polygon) if geographic else [list(zone.polygon)]
-    polygons = [[[list(point) for point in closed(ring)]] for ring in rings]
-    several = len(polygons) > 1
-    properties = _fields(zone, {"id": {"zone_id": zone.id}, "polygon": {}})
-    return _feature(
-        "zone",
-        "MultiPolygon" if several else "Polygon",
-        polygons if several else polygons[0],
-        **properties,
-    )
-
-
 def _fields(item: UAV | Target | NoFlyZone, instead: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the fields of an item by their names, but for those in whose place something else is said."""
     of: type = type(item)
@@ -100,11 +88,13 @@ def _fields(item: UAV | Target | NoFlyZone, instead: Mapping[str, Mapping[str, A
     return properties
 
 
-def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
+def _line(plan: FlownPlan, route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
     uav = route.uav
-    places = [(uav.x_c, uav.y_c), *((stop.target.x, stop.target.y) for stop in route.stops)]
+    places = [(uav.x_c, uav.y_c)]
+    for stop in route.stops:
+        places += stop.path[1:]
     if route.return_distance > 0:
-        places.append((uav.x_s, uav.y_s))
+        places += route.return_path[1:]
     lines = cut_line(places) if geographic else [places]
     several = len(lines) > 1
     coordinates = [[list(point) for point in line] for line in lines]
@@ -117,17 +107,40 @@ def _line(route: FlownRoute, *, geographic: bool) -> dict[str, Any]:
         return_distance=route.return_distance,
         range_left=route.range_left,
         return_time=route.return_time,
+        **({"waits_on_ground": route.waiting_on_ground} if plan.in_world else {}),
         stops=[
             {
                 "target_id": stop.target.id,
                 "step": stop.step,
                 "arrival_time": stop.arrival_time,
+                **(_times(stop) if plan.in_world else {}),
                 "distance": stop.distance,
                 "delivered": list(stop.delivered),
                 "range_left": stop.range_left,
             }
             for stop in route.stops
         ],
+    )
+
+
+def _times(stop: FlownStop) -> dict[str, float | None]:
+    return {
+        "begin_time": stop.begin_time,
+        "departure_time": stop.departure_time,
+        "endurance_left": stop.endurance_left,
+    }
+
+
+def _zone(zone: NoFlyZone, *, geographic: bool) -> dict[str, Any]:
+    rings = cut_ring(zone.polygon) if geographic else [list(zone.polygon)]
+    polygons = [[[list(point) for point in closed(ring)]] for ring in rings]
+    several = len(polygons) > 1
+    properties = _fields(zone, {"id": {"zone_id": zone.id}, "polygon": {}})
+    return _feature(
+        "zone",
+        "MultiPolygon" if several else "Polygon",
+        polygons if several else polygons[0],
+        **properties,
     )
 
 

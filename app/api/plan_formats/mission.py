@@ -1,8 +1,9 @@
 """From a UAV's route to MAVLink mission items, which both of QGroundControl's formats hold.
 
 A mission is: take off where it starts at home, fly at the UAV's speed, for every stop fly there, deliver and
-stay for the service time, then go home or land. Commands and frames are those of MAVLink's common message set
-(``MAV_CMD``, ``MAV_FRAME``).
+stay for the service time, then go home or land. Where the way is no straight line it flies over its corners;
+where it is there before the visit begins it loiters; in wind every leg has its speed over ground. Commands
+and frames are those of MAVLink's common message set (``MAV_CMD``, ``MAV_FRAME``).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 from app.api.plan_formats.errors import OutOfRange
-from app.api.plan_formats.flown_plan import FlownRoute, FlownStop
+from app.api.plan_formats.flown_plan import FlownRoute, FlownStop, Points
 from app.api.problem_details import FieldError
 from app.domain.problem import TOLERANCE
 
@@ -26,12 +27,15 @@ MIN_SPEED_M_S, MAX_SPEED_M_S = 0.1, 300.0
 MAX_HOLD_S = 65_535.0
 """Autopilots keep the seconds of a delay in 16 bits."""
 MAX_ITEMS = 65_535
+_SAME_SPEED = 1e-3
+"""Share by which speeds over ground differ for a leg to have one of its own."""
 
 
 class Command(IntEnum):
     """The MAV_CMDs that are used."""
 
     WAYPOINT = 16
+    LOITER_TIME = 19
     RETURN_TO_LAUNCH = 20
     LAND = 21
     TAKEOFF = 22
@@ -159,21 +163,45 @@ def _items(route: FlownRoute, choices: FlightChoices) -> Iterator[MissionItem]:
     uav = route.uav
     if route.starts_at_home:
         yield _placed(Command.TAKEOFF, choices, uav.x_s, uav.y_s, choices.altitude_m)
-    # 1: ground speed; -1: no change of throttle.
-    yield MissionItem(Command.CHANGE_SPEED, Frame.MISSION, (1.0, speed_m_s(route), -1.0, 0.0))
-    for number, stop in enumerate(route.stops, 1):
-        yield from _visit(stop, choices, last=number == len(route.stops))
+    told = speed_m_s(route)
+    yield _speed(told)
+    for number, stop in enumerate(route.stops):
+        speed = stop.ground_speed / 3.6
+        if abs(speed - told) > _SAME_SPEED * told:
+            told = speed
+            yield _speed(told)
+        yield from _corners(stop.path, choices)
+        last = number == len(route.stops) - 1
+        yield from _visit(stop, choices, _seconds(route.waiting_in_air(number)), last=last)
     if choices.end is Ending.RETURN:
+        yield from _corners(route.return_path, choices)
         yield MissionItem(Command.RETURN_TO_LAUNCH, Frame.MISSION, (0.0, 0.0, 0.0, 0.0))
     elif not (route.stops and choices.delivery is Delivery.LAND):
         x, y = (route.stops[-1].target.x, route.stops[-1].target.y) if route.stops else (uav.x_c, uav.y_c)
         yield _placed(Command.LAND, choices, x, y, 0.0)
 
 
-def _visit(stop: FlownStop, choices: FlightChoices, *, last: bool) -> Iterator[MissionItem]:
-    x, y, hold_s = stop.target.x, stop.target.y, stop.target.service_time * 3600.0
+def _speed(speed: float) -> MissionItem:
+    # 1: ground speed; -1: no change of throttle.
+    return MissionItem(Command.CHANGE_SPEED, Frame.MISSION, (1.0, speed, -1.0, 0.0))
+
+
+def _seconds(hours: float) -> float:
+    return hours * 3600.0
+
+
+def _corners(path: Points, choices: FlightChoices) -> Iterator[MissionItem]:
+    """Fly over the points between both ends of a way."""
+    for x, y in path[1:-1]:
+        yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
+
+
+def _visit(stop: FlownStop, choices: FlightChoices, waiting_s: float, *, last: bool) -> Iterator[MissionItem]:
+    x, y, hold_s = stop.target.x, stop.target.y, _seconds(stop.target.service_time)
     stay = MissionItem(Command.DELAY, Frame.MISSION, (hold_s, -1.0, -1.0, -1.0))
     yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
+    if waiting_s > 0:
+        yield _placed(Command.LOITER_TIME, choices, x, y, choices.altitude_m, waiting_s)
     match choices.delivery:
         case Delivery.LAND:
             yield _placed(Command.LAND, choices, x, y, 0.0)
@@ -216,23 +244,34 @@ def _violations(route: FlownRoute, choices: FlightChoices) -> Iterator[FieldErro
     yield from _place_violations(f"{at}/position", uav.x_c, uav.y_c)
     for number, stop in enumerate(route.stops):
         yield from _place_violations(f"{at}/stops/{number}", stop.target.x, stop.target.y)
-        hold_s = stop.target.service_time * 3600.0
-        if hold_s > MAX_HOLD_S:
-            yield FieldError(
-                pointer=f"{at}/stops/{number}/service_time",
-                detail=f"{uav.id!r} would stay {hold_s:g} s at {stop.target.id!r}, "
-                f"at most {MAX_HOLD_S:g} s can be told",
-            )
+        for name, does, hold_s in (
+            ("service_time", "stay", _seconds(stop.target.service_time)),
+            ("begin_time", "wait", _seconds(route.waiting_in_air(number))),
+        ):
+            if hold_s > MAX_HOLD_S:
+                yield FieldError(
+                    pointer=f"{at}/stops/{number}/{name}",
+                    detail=f"{uav.id!r} would {does} {hold_s:g} s at {stop.target.id!r}, "
+                    f"at most {MAX_HOLD_S:g} s can be told",
+                )
+        if stop.ground_speed != uav.speed:
+            yield from _speed_violations(f"{at}/stops/{number}/speed", route, stop.ground_speed / 3.6)
         yield from _range_violations(f"{at}/stops/{number}", route, f"at {stop.target.id!r}", stop.range_left)
     if choices.end is Ending.RETURN:
+        if route.return_time is None:
+            detail = (
+                f"{uav.id!r} need not return, and the plan has no way home (end=land stays at the last stop)"
+            )
+            yield FieldError(pointer=f"{at}/landing", detail=detail)
         yield from _range_violations(at, route, "at home (end=land stays at the last stop)", route.range_left)
-    speed = speed_m_s(route)
-    if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
-        yield FieldError(
-            pointer=f"{at}/speed",
-            detail=f"{uav.id!r} flies {speed:g} m/s, which is not in {MIN_SPEED_M_S:g}..{MAX_SPEED_M_S:g}",
-        )
+    yield from _speed_violations(f"{at}/speed", route, speed_m_s(route))
     yield from _choice_violations(choices)
+
+
+def _speed_violations(at: str, route: FlownRoute, speed: float) -> Iterator[FieldError]:
+    if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
+        limits = f"{MIN_SPEED_M_S:g}..{MAX_SPEED_M_S:g}"
+        yield FieldError(pointer=at, detail=f"{route.uav.id!r} flies {speed:g} m/s, which is not in {limits}")
 
 
 def _choice_violations(choices: FlightChoices) -> Iterator[FieldError]:

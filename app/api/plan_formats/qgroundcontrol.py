@@ -17,6 +17,7 @@ from app.api.plan_formats.mission import (
     mission,
     speed_m_s,
 )
+from app.domain.problem import NoFlyZone
 
 _ARDUPILOT = 3
 _MULTICOPTER = 2
@@ -25,7 +26,10 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 
 def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
-    """Write a ``.plan``, version 1, with a mission of version 2 of simple items; no fence, no rally points.
+    """Write a ``.plan``, version 1, with a mission of version 2 of simple items; no rally points.
+
+    No-fly zones are polygons of its fence that must not be entered. What a mission cannot say is in
+    ``notes``, a member that ground stations do not read.
 
     Raises
     ------
@@ -35,11 +39,11 @@ def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
     items = mission(route, choices)
     altitude_mode = _ALTITUDE_MODE[choices.altitude_reference]
     speed = speed_m_s(route)
-    content = {
+    content: dict[str, Any] = {
         "fileType": "Plan",
         "version": 1,
         "groundStation": "QGroundControl",
-        "geoFence": {"version": 2, "circles": [], "polygons": []},
+        "geoFence": {"version": 2, "circles": [], "polygons": [_kept_out(zone) for zone in route.zones]},
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
             "version": 2,
@@ -52,7 +56,24 @@ def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
             "items": [_simple_item(number, item, altitude_mode) for number, item in enumerate(items, 1)],
         },
     }
+    notes = _notes(route)
+    if notes:
+        content["notes"] = notes
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _kept_out(zone: NoFlyZone) -> dict[str, Any]:
+    return {"version": 1, "inclusion": False, "polygon": [[y, x] for x, y in zone.polygon]}
+
+
+def _notes(route: FlownRoute) -> list[str]:
+    """Say when the UAV takes off, where that is not at once."""
+    wait = route.waiting_on_ground
+    takes_off = route.uav.available_from + wait
+    if not route.starts_at_home or takes_off <= 0.0:
+        return []
+    why = "" if wait <= 0.0 else f", so that it waits for {route.stops[0].target.id!r} on the ground"
+    return [f"{route.uav.id!r} takes off {takes_off:g} h from the plan's begin{why}"]
 
 
 def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:

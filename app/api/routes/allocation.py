@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
-from app.api.allocation_models import Allocation, AllocationRequest
+from app.api.allocation_models import SOMETIMES_ANSWERED, Allocation, AllocationRequest
 from app.api.allocation_payload import allocation_payload
 from app.api.job_answers import accepted, gone, idempotency, written_answer_of
 from app.api.job_kinds import ALLOCATE
@@ -21,7 +21,9 @@ from app.api.routes.parameters import LOCATION, IdempotencyKey, Prefer
 from app.api.services import Served
 
 _FIELDS: dict[str, Any] = {
-    name: field.get_default(call_default_factory=True) for name, field in Allocation.model_fields.items()
+    name: field.get_default(call_default_factory=True)
+    for name, field in Allocation.model_fields.items()
+    if name not in SOMETIMES_ANSWERED
 }
 """With their defaults: a retry with its key may ask for what an earlier version answered."""
 

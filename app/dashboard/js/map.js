@@ -1,10 +1,11 @@
 /** The map: UAVs, areas and routes of the problem on screen, on a plane or on the globe. */
 
 import * as L from "../vendor/leaflet/leaflet.js";
+import { Air } from "./air.js";
 import { paint } from "./colours.js";
 import { Graticule } from "./graticule.js";
 import { shortAmounts, shown } from "./dom.js";
-import { met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
+import { called, met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
 import { extent, move, place, position, remove, requestedBy } from "./problem.js";
 import { get, select, subscribe } from "./state.js";
 import { areaDot, areaSymbol, aside, uavDot, uavSymbol } from "./symbols.js";
@@ -80,7 +81,7 @@ export class DispatchMap {
     const box = extent(problem);
     this.shift = 0;
     if (!box || problem.crs !== "wgs84" || box.maxX - box.minX <= 180) return box;
-    const east = [...problem.uavs.flatMap((uav) => [uav.x_s, position(uav).x]), ...problem.targets.map(({ x }) => x)].map((x) => (x < 0 ? x + 360 : x));
+    const east = [...problem.uavs.flatMap((uav) => [uav.x_s, position(uav).x]), ...problem.targets.map(({ x }) => x), ...(problem.no_fly_zones ?? []).flatMap(({ polygon }) => polygon.map(([x]) => x))].map((x) => (x < 0 ? x + 360 : x));
     const [minX, maxX] = [Math.min(...east), Math.max(...east)];
     if (maxX - minX >= box.maxX - box.minX) return box;
     this.shift = 360;
@@ -135,6 +136,7 @@ export class DispatchMap {
     }
     new Graticule(globe).addTo(this.map);
     if (globe) L.control.scale({ imperial: false }).addTo(this.map);
+    this.air = new Air(this.map, globe);
     this.map.createPane("routes").style.zIndex = 450;
     this.renderer = L.svg({ padding: 0.5, pane: "routes" });
     this.routes = L.layerGroup().addTo(this.map);
@@ -166,6 +168,7 @@ export class DispatchMap {
       if (plan) this.#drawRoutes(planned, plan);
       this.drawn = { plan, planned, shift: this.shift, routes: this.routes };
     }
+    this.air.draw(problem, (point) => this.#latLng(point), this.shift);
     const answer = plan && !Array.isArray(plan) && planned === problem ? plan : null;
     this.before = this.symbols;
     this.symbols = new Map();
@@ -191,7 +194,7 @@ export class DispatchMap {
     for (const { uav, index, points, stops: visits } of routes) {
       const line = L.polyline(points.map((point) => this.#latLng(point)), { renderer: this.renderer, className: "route", weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
       line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });
-      line.bindTooltip(() => tip(`${uav.id}: ${visits.map(({ target }) => target.id).join(" → ")}`), { sticky: true, className: "tip" });
+      line.bindTooltip(() => tip(`${called(uav)}: ${visits.map(({ target }) => called(target)).join(" → ")}`), { sticky: true, className: "tip" });
       this.routes.addLayer(line);
       const path = line.getElement();
       paint(path, uav.id);
@@ -218,8 +221,9 @@ export class DispatchMap {
     for (const target of problem.targets) {
       const looks = { urgent: urgency(target.level, highest), met: share.get(target.id), size };
       const says = () => {
-        const lines = [`${target.id} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}${target.requested ? ` of ${shortAmounts(requestedBy(target))}` : ""}`];
+        const lines = [`${called(target)} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}${target.requested ? ` of ${shortAmounts(requestedBy(target))}` : ""}`];
         if (answer) lines.push(`${shown(100 * looks.met, 3)}% met`);
+        if (target.earliest) lines.push(`from ${shown(target.earliest)}`);
         if (target.deadline !== undefined) lines.push(`by ${shown(target.deadline)}`);
         return lines.join("\n");
       };
@@ -236,7 +240,7 @@ export class DispatchMap {
       const spot = `${at.x} ${at.y}`;
       const nth = crowds.get(spot) ?? 0;
       crowds.set(spot, nth + 1);
-      const says = () => `${uav.id} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${shortAmounts(uav.loadlist)}`;
+      const says = () => `${called(uav)} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${shortAmounts(uav.loadlist)}`;
       this.#addSymbol("uavs", uav, at, () => (this.dots ? uavDot : uavSymbol)(uav, size), aside(nth, size), { colour: colours[uav.id], size, nth, ret: uav.ret, left: rangeShare(uav).toFixed(3) }, says);
     }
   }

@@ -4,7 +4,7 @@
  */
 
 import { idOf } from "./kinds.js";
-import { sum } from "./plan.js";
+import { sum, waiting } from "./plan.js";
 import { requestedBy } from "./problem.js";
 
 const EARTH_RADIUS_KM = 6371.0088;
@@ -37,6 +37,34 @@ export function between(crs, from, to, fraction) {
   return [degrees(Math.atan2(y, x)), degrees(Math.atan2(z, Math.hypot(x, y)))];
 }
 
+/** Where somebody is on a way, a share of its length after its first point, and the points from there on. */
+function onWay(crs, points, fraction) {
+  if (points.length === 2) {
+    const place = between(crs, ...points, fraction);
+    return { place, ahead: [place, points[1]] };
+  }
+  const lengths = points.slice(1).map((point, k) => distance(crs, points[k], point));
+  let left = Math.min(1, Math.max(0, fraction)) * sum(lengths);
+  for (const [k, length] of lengths.entries()) {
+    if (left < length || k === lengths.length - 1) {
+      const place = between(crs, points[k], points[k + 1], length > 0 ? left / length : 1);
+      return { place, ahead: [place, ...points.slice(k + 1)] };
+    }
+    left -= length;
+  }
+  return { place: points[0], ahead: points };
+}
+
+/** When a visit of a stop begins and has ended; an answer to a problem without a world has the arrival alone. */
+function timesOf(stop, target) {
+  return { begins: stop.begin_time ?? stop.arrival_time, leaves: stop.departure_time ?? stop.arrival_time + (target.service_time ?? 0) };
+}
+
+/** When a UAV has landed, if its last visit has ended at a time. */
+function lands(uav, route, leaves) {
+  return route.landing?.time ?? leaves + route.return_distance / uav.speed;
+}
+
 const uavId = (uav, i) => idOf("uavs", uav, i);
 const targetId = (target, j) => idOf("targets", target, j);
 const rounded = (amount) => (Math.abs(amount) < 1e-9 ? 0 : amount);
@@ -49,8 +77,9 @@ export function missionEnd(problem, answer) {
     0,
     ...answer.routes.map((route, i) => {
       const last = route.stops.at(-1);
-      const leaves = last ? last.arrival_time + (byId.get(last.target_id).service_time ?? 0) : 0;
-      return leaves + route.return_distance / problem.uavs[i].speed;
+      if (!last && !route.return_distance) return 0;
+      const leaves = last ? timesOf(last, byId.get(last.target_id)).leaves : (problem.uavs[i].available_from ?? 0);
+      return lands(problem.uavs[i], route, leaves);
     }),
   );
 }
@@ -61,13 +90,16 @@ export function moments(problem, answer) {
   const all = new Set([0, missionEnd(problem, answer)]);
   for (const route of answer.routes)
     for (const stop of route.stops) {
-      all.add(stop.arrival_time);
-      all.add(stop.arrival_time + (byId.get(stop.target_id).service_time ?? 0));
+      const { begins, leaves } = timesOf(stop, byId.get(stop.target_id));
+      for (const at of [stop.arrival_time, begins, leaves]) all.add(at);
     }
   return [...all].sort((a, b) => a - b);
 }
 
-/** What one UAV is doing at a moment: where it is, how far it has flown, which stops are behind it. */
+/**
+ * What one UAV is doing at a moment: where it is, how far it has flown, since when it is in the air, which stops are
+ * behind it, and what is left of the way that it is on.
+ */
 export function uavAt(problem, answer, i, time) {
   const uav = problem.uavs[i];
   const route = answer.routes[i];
@@ -75,38 +107,55 @@ export function uavAt(problem, answer, i, time) {
   const byId = new Map(problem.targets.map((target, j) => [targetId(target, j), target]));
   let place = [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s];
   let flown = uav.dis ?? 0;
-  let leaves = 0;
+  let leaves = uav.available_from ?? 0;
+  let rangeLeft = uav.voyage - flown;
+  const tookOff = leaves + (route.stops.length ? waitOnGround(uav, route.stops[0]) : 0);
   for (const [order, stop] of route.stops.entries()) {
     const target = byId.get(stop.target_id);
     const there = [target.x, target.y];
-    if (time < stop.arrival_time) {
-      const fraction = Math.max(0, (time - leaves) / (stop.arrival_time - leaves));
+    const onGround = order === 0 ? waitOnGround(uav, stop) : 0;
+    const [starts, arrives] = [leaves + onGround, stop.arrival_time + onGround];
+    const times = timesOf(stop, target);
+    // What range counts is longer than the way against the wind.
+    const length = stop.range_left === undefined ? stop.distance : rangeLeft - stop.range_left;
+    if (time < arrives) {
+      const fraction = Math.max(0, (time - starts) / (arrives - starts));
+      const { place: now, ahead } = onWay(problem.crs, stop.path ?? [place, there], fraction);
       return {
-        place: between(problem.crs, place, there, fraction),
-        flown: flown + fraction * stop.distance,
+        place: now,
+        ahead,
+        flown: flown + fraction * length,
+        tookOff,
         done: order,
         doing: fraction > 0 ? "flying" : "waiting",
         next: stop.target_id,
         returning: Boolean(uav.ret),
       };
     }
-    flown += stop.distance;
+    flown += length;
+    rangeLeft = stop.range_left;
     place = there;
-    leaves = stop.arrival_time + (target.service_time ?? 0);
+    leaves = times.leaves;
+    if (time < times.begins) return { place, flown, tookOff, done: order, doing: "waiting", next: stop.target_id, returning: Boolean(uav.ret) };
     if (time < leaves)
       return {
-        place, flown, done: order + 1, doing: "unloading", next: stop.target_id,
+        place, flown, tookOff, done: order + 1, doing: "unloading", next: stop.target_id,
         // With its last stop it is as good as sent home, but a new plan may still have another idea.
         returning: Boolean(uav.ret),
       };
   }
   const done = route.stops.length;
   if (route.return_distance <= 1e-9)
-    return { place, flown, done, doing: done ? "home" : "idle", next: null, returning: Boolean(uav.ret) || done > 0 };
-  const fraction = Math.min(1, (time - leaves) / (route.return_distance / uav.speed));
+    return { place, flown, tookOff, done, doing: done ? "home" : "idle", next: null, returning: Boolean(uav.ret) || done > 0 };
+  // Who need not return is done where its last visit has ended.
+  if (route.landing !== undefined && problem.objective?.return_to_base === false)
+    return { place, flown, tookOff, done, doing: done ? "landed" : "idle", next: null, returning: Boolean(uav.ret) || done > 0 };
+  const flight = lands(uav, route, leaves) - leaves;
+  const fraction = Math.max(0, Math.min(1, (time - leaves) / flight));
   return {
-    place: between(problem.crs, place, home, fraction),
-    flown: flown + fraction * route.return_distance,
+    place: onWay(problem.crs, route.landing?.path ?? [place, home], fraction).place,
+    flown: flown + fraction * (problem.wind ? flight * uav.speed : route.return_distance),
+    tookOff,
     done,
     doing: fraction < 1 ? "returning" : "home",
     next: null,
@@ -115,11 +164,17 @@ export function uavAt(problem, answer, i, time) {
   };
 }
 
+/** How long a UAV waits for its first visit before it takes off. */
+function waitOnGround(uav, stop) {
+  const { time, onGround } = waiting(uav, stop, 0);
+  return onGround ? time : 0;
+}
+
 /**
  * The mission at a moment as a problem.
  *
- * Material counts as unloaded on arrival. All times are counted from the moment on. The distance weight is the
- * one that the plan was found with, so that rewards before and after can be compared.
+ * Material counts as unloaded when a visit begins. All times are counted from the moment on. The distance weight is
+ * the one that the plan was found with, so that rewards before and after can be compared.
  *
  * @param {object} problem what was allocated
  * @param {object} answer the plan for it
@@ -144,6 +199,7 @@ export function problemAt(problem, answer, time, { lost = new Set(), recall = fa
       ...(uav.committed ? { committed: uav.committed.filter((id) => !visited.has(id)) } : {}),
       ...(uav.available_from ? { available_from: Math.max(0, uav.available_from - time) } : {}),
       ...(uav.available_until == null ? {} : { available_until: uav.available_until - time }),
+      ...(uav.endurance == null ? {} : { airborne: (uav.airborne ?? 0) + Math.max(0, time - now.tookOff) }),
     });
   });
   const targets = problem.targets.map((target, j) => {
@@ -178,9 +234,12 @@ export function remainder(problem, answer, time, lost = new Set()) {
     const now = uavAt(problem, answer, i, time);
     const dropped = route.stops.slice(now.done);
     if (lost.has(id)) return { uav_id: id, lost: true, stops: [], dropped, distance: 0 };
-    const stops = dropped.map((stop) => ({ ...stop, arrival_time: stop.arrival_time - time }));
+    const shifted = (stop) => Object.fromEntries(["begin_time", "departure_time"].filter((name) => name in stop).map((name) => [name, stop[name] - time]));
+    const stops = dropped.map((stop) => ({ ...stop, arrival_time: stop.arrival_time - time, ...shifted(stop) }));
+    if (stops.length && stops[0].path) stops[0] = { ...stops[0], path: now.ahead ?? null };
+    const landing = route.landing && { ...route.landing, time: route.landing.time - time };
     const flown = now.flown - (problem.uavs[i].dis ?? 0);
-    return { uav_id: id, lost: false, stops, dropped: [], distance: stops.length ? Math.max(0, route.distance - flown) : 0 };
+    return { uav_id: id, lost: false, stops, dropped: [], ...(landing === undefined ? {} : { landing }), distance: stops.length ? Math.max(0, route.distance - flown) : 0 };
   });
 }
 

@@ -2,24 +2,55 @@
 
 import { position, requestedBy } from "./problem.js";
 
+/** What an item is called: its name, where it has one; names need not be unique, so its id stands beside it. */
+export function called({ id, name }) {
+  return name ?? id;
+}
+
+/** What items are called, by their ids. @returns {(id: string) => string} */
+export function names(items) {
+  const known = new Map(items.map((item) => [item.id, called(item)]));
+  return (id) => known.get(id) ?? id;
+}
+
+/** How long a UAV waits for its n-th visit (from 0), and whether before it takes off. */
+export function waiting(uav, stop, n) {
+  const time = (stop.begin_time ?? stop.arrival_time) - stop.arrival_time;
+  return { time, onGround: n === 0 && stateOf(uav) === "at its base" && !uav.airborne };
+}
+
 /**
  * Routes of an answer, or of a list of joint actions, in one form.
  * @param {object} problem
  * @param {object | number[][]} plan an answer of the API, or an incumbent's `assignment`
  * @returns {{uav: object, index: number, stops: {target: object, stop: object | null}[], points: {x, y}[]}[]}
- *   only of UAVs that visit something; points begin at the present position and end at the start
+ *   only of UAVs that visit something; points begin at the present position, turn where the way does, and end at
+ *   the start, or at the last stop where the UAV need not return
  */
 export function routesOf(problem, plan) {
   if (!plan) return [];
   const visits = Array.isArray(plan) ? visitsOfActions(problem, plan) : visitsOfAnswer(problem, plan);
+  const landings = new Map(Array.isArray(plan) ? [] : plan.routes.map((route) => [route.uav_id, route.landing]));
   return problem.uavs
     .map((uav, index) => ({
       uav,
       index,
       stops: visits[index],
-      points: [position(uav), ...visits[index].map(({ target }) => target), { x: uav.x_s, y: uav.y_s }],
+      points: [position(uav), ...visits[index].flatMap(({ target, stop }) => beyond(stop?.path, target)), ...wayHome(problem, uav, landings.get(uav.id))],
     }))
     .filter(({ stops }) => stops.length);
+}
+
+/** Points of a way after its first: where it turns, and where it ends. */
+function beyond(path, there) {
+  return path ? path.slice(1).map(([x, y]) => ({ x, y })) : [there];
+}
+
+/** The same of the way home; the answer to a problem without a world says nothing of it. */
+function wayHome(problem, uav, landing) {
+  const home = { x: uav.x_s, y: uav.y_s };
+  if (landing === undefined) return [home];
+  return problem.objective?.return_to_base === false ? [] : beyond(landing?.path, home);
 }
 
 function visitsOfActions(problem, assignment) {

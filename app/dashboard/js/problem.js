@@ -130,7 +130,7 @@ export function requestedBy(target) {
   return target.requested ?? target.loadlist;
 }
 
-/** The box of all positions; null without any. */
+/** The box of all positions and corners of zones; null without any. */
 export function extent(problem) {
   let box = null;
   const take = (x, y) => {
@@ -146,5 +146,6 @@ export function extent(problem) {
     take(now.x, now.y);
   }
   for (const target of problem.targets) take(target.x, target.y);
+  for (const { polygon } of problem.no_fly_zones ?? []) for (const [x, y] of polygon) take(x, y);
   return box;
 }

@@ -15,6 +15,7 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
   const places = [
     ...task.uavs.flatMap((uav) => [[uav.x_s, uav.y_s], [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s]]),
     ...task.targets.map((target) => [target.x, target.y]),
+    ...(task.no_fly_zones ?? []).flatMap(({ polygon }) => polygon),
   ];
   const xs = places.map(([x]) => x);
   const ys = places.map(([, y]) => y);
@@ -24,16 +25,18 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
   const dx = (width - scale * (right - left)) / 2;
   const dy = (height - scale * (high - low)) / 2;
   const at = ([x, y]) => [dx + (x - left) * scale, height - dy - (y - low) * scale];
+  const line = (points) => points.map((place) => at(place).map((value) => value.toFixed(1)).join(",")).join(" ");
+  for (const { polygon } of task.no_fly_zones ?? []) picture.append(svg("polygon", { points: line(polygon), class: "no-fly-zone" }));
   const byId = new Map(task.targets.map((target, j) => [idOf("targets", target, j), target]));
   answer?.routes.forEach((route, i) => {
     if (!route.stops.length) return;
     const uav = task.uavs[i];
     const points = [
       [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s],
-      ...route.stops.map((stop) => [byId.get(stop.target_id).x, byId.get(stop.target_id).y]),
-      [uav.x_s, uav.y_s],
-    ].map((place) => at(place).map((value) => value.toFixed(1)).join(","));
-    picture.append(paint(svg("polyline", { points: points.join(" "), class: "route", "data-uav": route.uav_id }), route.uav_id, i));
+      ...route.stops.flatMap((stop) => stop.path?.slice(1) ?? [[byId.get(stop.target_id).x, byId.get(stop.target_id).y]]),
+      ...(route.landing?.path?.slice(1) ?? [[uav.x_s, uav.y_s]]),
+    ];
+    picture.append(paint(svg("polyline", { points: line(points), class: "route", "data-uav": route.uav_id }), route.uav_id, i));
   });
   const most = Math.max(1e-12, ...task.targets.map((target) => target.level));
   const unmet = new Set(answer?.unmet.map((each) => each.target_id));

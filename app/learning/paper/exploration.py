@@ -65,7 +65,7 @@ def choose(
     epsilon
         Probability of a random allowed action; 0 is greedy whatever the draws are.
     """
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     if draws[b, i, 0] < epsilon:
         count = 1
         for j in range(home):
@@ -109,7 +109,7 @@ def explore(
         rewards[b] = 0.0
         if episodes.done[b]:
             for i in range(actions.shape[1]):
-                actions[b, i] = arrays.level.shape[1]
+                actions[b, i] = arrays.need.shape[1]
             continue
         for i in range(actions.shape[1]):
             actions[b, i] = choose(arrays, episodes, b, i, values, draws, epsilon)

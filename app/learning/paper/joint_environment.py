@@ -43,6 +43,8 @@ def _copy(episodes: Episodes, source: int, scratch: Episodes, row: int) -> None:
         scratch.at[row, i] = episodes.at[source, i]
         scratch.flown[row, i] = episodes.flown[source, i]
         scratch.clock[row, i] = episodes.clock[source, i]
+        scratch.aloft[row, i] = episodes.aloft[source, i]
+        scratch.visits[row, i] = episodes.visits[source, i]
         scratch.ret[row, i] = episodes.ret[source, i]
         for k in range(episodes.load.shape[2]):
             scratch.load[row, i, k] = episodes.load[source, i, k]
@@ -72,7 +74,7 @@ def allowed_joint_actions(
     out
         ((N+1)^M,), overwritten; the first UAV's action is the most significant digit of the index.
     """
-    m, home = episodes.at.shape[1], arrays.level.shape[1]
+    m, home = episodes.at.shape[1], arrays.need.shape[1]
     out[:] = False
     _copy(episodes, 0, scratch, 0)
     depth, index = 0, 0
@@ -129,7 +131,7 @@ def choose_joint(values: Float32s, allowed: Flags, draws: Floats, epsilon: float
 
 @compiled
 def _step(arrays: ProblemArrays, episodes: Episodes, joint: int) -> float:
-    m, base = episodes.at.shape[1], arrays.level.shape[1] + 1
+    m, base = episodes.at.shape[1], arrays.need.shape[1] + 1
     divisor = base ** (m - 1)
     reward = 0.0
     for i in range(m):

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
+from app.simulation.visit import worth_by_material
 from app.solvers.scale import largest_level
 
 _DIGITS = 2.0**38
@@ -24,7 +25,7 @@ class Instance(NamedTuple):
     scale
         Reward that one unit stands for here, > 0.
     worth
-        (N, K) what meeting the whole need of a material at a target earns.
+        (N, K) what meeting the whole need of a material at a target earns at most.
     need
         (N, K) amounts needed.
     load
@@ -50,18 +51,21 @@ class Instance(NamedTuple):
 def new_instance(problem: Problem) -> Instance:
     """Scale a problem."""
     arrays = compile_problem(problem)
-    need, load, level = arrays.need[0], arrays.load[0], arrays.level[0]
-    wanted = arrays.need_total[0] > 0
+    need, load = arrays.need[0], arrays.load[0]
+    wanted = arrays.areas["need_total"][0] > 0
     scale = largest_level(arrays)
-    earned = rounded(level / scale)
-    share = need / np.where(wanted, arrays.need_total[0], 1.0)[:, None]
-    price = float(rounded(arrays.weight / scale)[0])
+    if arrays.terms["bonus"][0] == 0.0:
+        earned = rounded(arrays.areas["level"][0] / scale)
+        worth = earned[:, None] * (need / np.where(wanted, arrays.areas["need_total"][0], 1.0)[:, None])
+    else:
+        worth = rounded(worth_by_material(arrays) / scale)
+    price = float(rounded(arrays.terms["weight"] / scale)[0])
     out = ~arrays.ret[0]
-    charged = out & bool(arrays.charge_return[0])
+    charged = out & bool(arrays.terms["charge_return"][0])
     # As a product of matrices: with many materials much quicker than comparing each with each.
     useful = out[:, None] & ((load > 0).astype(np.float32) @ (need > 0).astype(np.float32).T > 0)
-    idle = np.where(charged, -price * arrays.start_home[0], 0.0)
-    return Instance(arrays, scale, earned[:, None] * share, need, load, price, idle, useful)
+    idle = np.where(charged, -price * arrays.uavs["start_home"][0], 0.0)
+    return Instance(arrays, scale, worth, need, load, price, idle, useful)
 
 
 def rounded(values: Floats) -> Floats:

@@ -11,11 +11,12 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, compiled, new_episodes, reset_one, verdict
-from app.simulation.visit import ALLOWED, limits
+from app.simulation.simulator import Episodes, act, close, compiled, new_episodes, reset_one, verdict
+from app.simulation.visit import ALLOWED, START, airborne, leg, ready
 from app.solvers.bound.instance import Instance
 from app.solvers.bound.relaxation import Pools, Priced
-from app.solvers.bound.target_sets import SLACK, Members, TargetSets
+from app.solvers.bound.target_sets import Members, TargetSets
+from app.solvers.local_search.routes import lay
 from app.solvers.protocol import StopCriterion
 
 _MOST_ROUTES = 20_000
@@ -82,7 +83,7 @@ class JointPlans:
         if chosen[0] < 0:
             return
         steps, m = int(self._instance.arrays.max_steps[0]), len(chosen)
-        self.actions = np.full((steps, m), self._instance.arrays.level.shape[1], np.int64)
+        self.actions = np.full((steps, m), self._instance.arrays.areas["level"].shape[1], np.int64)
         for i, q in enumerate(chosen):
             self.actions[: length[q], i] = targets[q, : length[q]]
 
@@ -94,13 +95,9 @@ class JointPlans:
         pool = pools.sets[i]
         # The pool may have lost sets since the prices were evaluated.
         worth = self._worth(priced, i, pool)
-        ranges, deadlines = limits(arrays, SLACK)
         targets, length, slack = _orders(
-            own.members, own.size, own.cost, pool, priced.best[i] - worth, room, instance.price,
-            int(arrays.max_steps[0]), arrays.start_target[0, i], arrays.between[0], arrays.home[0, i],
-            float(arrays.speed[0, i]),
-            float(ranges[i] - arrays.dis[0, i]), deadlines, arrays.service[0],
-            bool(arrays.return_to_base[0]), bool(arrays.charge_return[0]), _MOST_ROUTES, _MOST_ORDERS,
+            arrays, i, own.members, own.size, own.cost, pool, priced.best[i] - worth, room, instance.price,
+            _MOST_ROUTES, _MOST_ORDERS,
         )  # fmt: skip
         if len(length) >= _MOST_ROUTES:
             return None
@@ -119,6 +116,8 @@ class JointPlans:
 
 @njit(cache=True, error_model="numpy")
 def _orders(
+    arrays: ProblemArrays,
+    i: int,
     members: Members,
     size: Integers,
     cost: Floats,
@@ -126,16 +125,6 @@ def _orders(
     slack: Floats,
     room: float,
     price: float,
-    longest: int,
-    start: Floats,
-    between: Floats,
-    home: Floats,
-    speed: float,
-    reach: float,
-    latest: Floats,
-    service: Floats,
-    must_return: bool,
-    charged: bool,
     most: int,
     tries: int,
 ) -> tuple[Members, Integers, Floats]:
@@ -143,11 +132,15 @@ def _orders(
 
     It is not all where there are more, or finding them takes more than so many `tries`.
     """
+    longest = arrays.max_steps[0]
     targets = np.zeros((most, longest), np.int16)
     length, loss = np.zeros(most, np.int64), np.zeros(most)
     found = 0
     order, used = np.zeros(longest + 1, np.int64), np.zeros(longest + 1, np.bool_)
-    flown, clock = np.zeros(longest + 1), np.zeros(longest + 1)
+    route = np.zeros(longest, np.int64)
+    flown, clock, aloft = np.zeros(longest + 1), np.zeros(longest + 1), np.zeros(longest + 1)
+    way = np.zeros(longest + 1)
+    clock[0], aloft[0] = ready(arrays, 0, i), airborne(arrays, 0, i)
     for at in range(len(pool)):
         r, s = pool[at], size[pool[at]]
         if slack[at] > room:
@@ -165,12 +158,13 @@ def _orders(
                         return targets, length, loss
                     tries -= 1
                     j = members[r, t]
-                    d = start[j] if depth == 0 else between[members[r, order[depth - 1]], j]
-                    way = flown[depth] + d
-                    arrival = clock[depth] + d / speed
-                    back = home[j] if must_return else 0.0
-                    fits = slack[at] + price * way - cost[r] <= room + 1e-12 * (abs(room) + cost[r])
-                    if fits and way + back <= reach and arrival <= latest[j] + 1e-12 * arrival:
+                    route[depth] = j
+                    way[depth + 1] = way[depth] + leg(
+                        arrays, 0, i, START if depth == 0 else route[depth - 1], j
+                    )
+                    more = price * way[depth + 1] - cost[r]
+                    fits = slack[at] + more <= room + 1e-12 * (abs(room) + cost[r])
+                    if fits and lay(arrays, i, route, depth + 1, depth, flown, clock, aloft):
                         break
                 t += 1
             if t >= s:
@@ -178,7 +172,8 @@ def _orders(
                 continue
             order[depth] = t
             if depth + 1 == s:
-                total = slack[at] + price * (way + (home[j] if charged else 0.0)) - cost[r]
+                back = arrays.home[0, i, route[depth]] if arrays.terms[0].charge_return else 0.0
+                total = slack[at] + price * (way[depth + 1] + back) - cost[r]
                 if total <= room:
                     if found == most:
                         return targets, length, loss
@@ -188,7 +183,6 @@ def _orders(
                     found += 1
                 continue
             used[t] = True
-            flown[depth + 1], clock[depth + 1] = way, arrival + service[j]
             depth += 1
             order[depth] = -1
     return targets[:found].copy(), length[:found].copy(), loss[:found].copy()
@@ -212,9 +206,7 @@ def _fly(
                     return -np.inf
                 reward += act(arrays, episodes, 0, i, targets[q, s])
         s += 1
-    for i in range(m):
-        reward += act(arrays, episodes, 0, i, arrays.level.shape[1])
-    return reward
+    return reward + close(arrays, episodes, 0)
 
 
 @njit(cache=True, error_model="numpy")

@@ -2,7 +2,9 @@
 
 On a route of a given set with a given last target the service times before it are the same in every order,
 so the shortest way there is also the earliest arrival: one number a state makes the dynamic program exact,
-with range and deadlines (the argument of Held and Karp, extended; see README.md).
+with range and deadlines (the argument of Held and Karp, extended; see README.md). In wind, with given times,
+and where UAVs wait, the least length, the least air length and the earliest arrival may be of other orders:
+then there are three numbers, and some sets more than are legal.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Floats, Integers
+from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.visit import limits
 from app.solvers.bound.instance import Instance
@@ -69,26 +71,15 @@ def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSe
         return TargetSets(
             np.empty((0, 1), np.int16), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
         )
-    ranges, deadlines = limits(arrays, SLACK)
     binomial = np.array([[comb(a, b) for b in range(longest + 2)] for a in range(n + 1)], np.int64)
-    given = (
-        binomial,
-        np.ascontiguousarray(arrays.start_target[0, i, targets]),
-        np.ascontiguousarray(arrays.between[0][np.ix_(targets, targets)]),
-        np.ascontiguousarray(arrays.home[0, i, targets]),
-        float(arrays.speed[0, i]),
-        float(ranges[i] - arrays.dis[0, i]),
-        deadlines[targets],
-        np.ascontiguousarray(arrays.service[0, targets]),
-        bool(arrays.return_to_base[0]),
-        bool(arrays.charge_return[0]),
-    )
+    given = (binomial, legs_of_uav(arrays, i, targets))
     found: list[tuple[Members, Floats]] = []
-    way = np.zeros(1)
+    before = (np.zeros(1), np.zeros(1), np.zeros(1))
     for s in range(1, longest + 1):
         if stop():
             return None
-        members, distance, way = _enumerate(s, way, *given)
+        members, distance, *least = _enumerate(s, *before, *given)
+        before = (least[0], least[1], least[2])
         found.append((members, distance))
         if not len(distance):
             break  # A legal route begins with one that has a visit less, so no larger set has any.
@@ -100,44 +91,124 @@ def sets_of(instance: Instance, i: int, stop: StopCriterion = never) -> TargetSe
     return TargetSets(targets.astype(np.int16)[members], size, mask, instance.price * distance)
 
 
+class LegsOfUAV(NamedTuple):
+    """What one UAV needs to fly to n targets, and has, with slack; no way over other places is less.
+
+    Attributes
+    ----------
+    start, between, home
+        (n,), (n, n), (n,) lengths; those home where they are charged, else 0.
+    start_time, between_time
+        (n,), (n, n) times of the same legs.
+    start_air, between_air
+        (n,), (n, n) their air lengths.
+    reach
+        (n,) air length that may be flown on arrival.
+    ready
+        Its clock at the start.
+    earliest, latest, service, land_by
+        (n,) when a visit begins soonest, the latest arrival, its service time, and when it must have ended.
+    simple
+        Whether air lengths are lengths, times follow from them, and nobody waits: then the shortest order is
+        the first to arrive.
+    speed
+        Of the UAV.
+    """
+
+    start: Floats
+    between: Floats
+    home: Floats
+    start_time: Floats
+    between_time: Floats
+    start_air: Floats
+    between_air: Floats
+    reach: Floats
+    ready: float
+    earliest: Floats
+    latest: Floats
+    service: Floats
+    land_by: Floats
+    simple: bool
+    speed: float
+
+
+def legs_of_uav(arrays: ProblemArrays, i: int, targets: Integers) -> LegsOfUAV:
+    """Write down what UAV `i` needs to fly to some targets, and what it has."""
+    speed, of = float(arrays.uavs["speed"][0, i]), arrays.uavs["leg_class"][0, i]
+    ranges, deadlines = limits(arrays, SLACK)
+    timed, in_wind = arrays.terms["timed"][0], arrays.terms["in_wind"][0]
+    every = np.ix_(targets, targets)
+    start, between = arrays.start_target[0, i, targets], arrays.between[0, of][every]
+    start_time = arrays.start_time[0, i, targets] if timed else start / speed
+    between_time = arrays.between_time[0, of][every] if timed else between / speed
+    if not arrays.terms["metric"][0]:
+        start, between = _least_over_others(start, between)
+        start_time, between_time = _least_over_others(start_time, between_time)
+    home, must_return = arrays.home[0, i, targets], bool(arrays.terms["return_to_base"][0])
+    home_time = (
+        (arrays.home_time[0, i, targets] if timed else home / speed) if must_return else np.zeros(len(home))
+    )
+    until = float(arrays.uavs["until"][0, i])
+    return LegsOfUAV(
+        start=np.ascontiguousarray(start),
+        between=np.ascontiguousarray(between),
+        home=home if arrays.terms["charge_return"][0] else np.zeros(len(home)),
+        start_time=np.ascontiguousarray(start_time),
+        between_time=np.ascontiguousarray(between_time),
+        start_air=np.ascontiguousarray(start_time * speed if in_wind else start),
+        between_air=np.ascontiguousarray(between_time * speed if in_wind else between),
+        reach=ranges[i] - arrays.uavs["dis"][0, i] - arrays.kept_range[0, i, targets],
+        ready=float(arrays.uavs["ready"][0, i]),
+        earliest=arrays.areas["earliest"][0, targets],
+        latest=deadlines[targets],
+        service=arrays.areas["service"][0, targets],
+        land_by=until + abs(until) * SLACK - home_time,
+        simple=not timed and until == np.inf and not arrays.areas["earliest"][0, targets].any(),
+        speed=speed,
+    )
+
+
+def _least_over_others(start: Floats, between: Floats) -> tuple[Floats, Floats]:
+    """Return the least that legs from a start and among targets could be over any other of these targets."""
+    least = between.copy()
+    np.fill_diagonal(least, 0.0)
+    for over in range(len(least)):
+        np.minimum(least, least[:, over, None] + least[None, over], out=least)
+    return np.minimum(start, (start[:, None] + least).min(axis=0)), least
+
+
 @njit(cache=True, error_model="numpy")
 def _enumerate(
-    s: int,
-    before: Floats,
-    binomial: Integers,
-    start: Floats,
-    between: Floats,
-    home: Floats,
-    speed: float,
-    reach: float,
-    latest: Floats,
-    service: Floats,
-    must_return: bool,
-    charged: bool,
-) -> tuple[Members, Floats, Floats]:
+    s: int, before: Floats, before_air: Floats, before_end: Floats, binomial: Integers, legs: LegsOfUAV
+) -> tuple[Members, Floats, Floats, Floats, Floats]:
     """Go through the sets of size `s` in colexicographic order; return those with a legal route.
 
-    The second is the length of the shortest one; in the third, ``way[rank · s + p]`` is the shortest legal
-    way over the set of that rank which ends at its member p. `before` is the same of the size below.
+    The second is the length of the shortest one; in the third, ``way[rank · s + p]`` is the length of the
+    shortest way over the set of that rank which ends at its member p. The others are the least air length and
+    the soonest end likewise, where they do not follow from it: each by itself, so that limits on them leave
+    out no legal route. `before` and so on are the same of the size below.
     """
-    n = len(start)
+    n = len(legs.start)
     count = binomial[n, s]
     members = np.zeros((count, s), np.int16)
     distance = np.zeros(count)
     found = 0
     chosen = np.zeros(s + 1, np.int64)
     way = np.full(count * s, np.inf)
+    others = 0 if legs.simple else count * s
+    way_air, way_end = np.full(others, np.inf), np.full(others, np.inf)
     for t in range(s):
         chosen[t] = t
     for rank in range(count):
         best = np.inf
         served = 0.0
         for t in range(s):
-            served += service[chosen[t]]
+            served += legs.service[chosen[t]]
         for p in range(s):
             j = chosen[p]
+            air, arrival = np.inf, np.inf
             if s == 1:
-                d = start[j]
+                d, air, arrival = legs.start[j], legs.start_air[j], legs.ready + legs.start_time[j]
             else:
                 rest = 0
                 for t in range(p):
@@ -147,15 +218,26 @@ def _enumerate(
                 d = np.inf
                 for q in range(s - 1):
                     from_ = chosen[q] if q < p else chosen[q + 1]
-                    d = min(d, before[rest * (s - 1) + q] + between[from_, j])
-            if d == np.inf or d + (home[j] if must_return else 0.0) > reach:
+                    d = min(d, before[rest * (s - 1) + q] + legs.between[from_, j])
+                    if not legs.simple:
+                        air = min(air, before_air[rest * (s - 1) + q] + legs.between_air[from_, j])
+                        arrival = min(arrival, before_end[rest * (s - 1) + q] + legs.between_time[from_, j])
+            if legs.simple:
+                air = d
+            if d == np.inf or air > legs.reach[j]:
                 continue
-            if latest[j] < np.inf:
-                arrival = d / speed + (served - service[j])
-                if arrival > latest[j] + 1e-12 * (arrival + served):
+            if legs.latest[j] < np.inf or not legs.simple:
+                if legs.simple:
+                    arrival = legs.ready + d / legs.speed + (served - legs.service[j])
+                if arrival > legs.latest[j] + 1e-12 * (arrival + served):
                     continue
+                if not legs.simple:
+                    end = max(arrival, legs.earliest[j]) + legs.service[j]
+                    if end > legs.land_by[j] + 1e-12 * end:
+                        continue
+                    way_air[rank * s + p], way_end[rank * s + p] = air, end
             way[rank * s + p] = d
-            best = min(best, d + (home[j] if charged else 0.0))
+            best = min(best, d + legs.home[j])
         if best < np.inf:
             distance[found] = best
             for t in range(s):
@@ -167,4 +249,4 @@ def _enumerate(
             chosen[t] = t
             t += 1
         chosen[t] += 1
-    return members[:found].copy(), distance[:found].copy(), way
+    return members[:found].copy(), distance[:found].copy(), way, way_air, way_end

@@ -105,7 +105,7 @@ def _earnings(
 def _shortest_legs(instance: Instance) -> Floats:
     """Return the least a visit costs, (M, N); infinite where it is not possible at all."""
     arrays = instance.arrays
-    legs = _nearest_legs(arrays.start_target[0], arrays.between[0])
+    legs = _nearest_legs(arrays.start_target[0], arrays.between[0].min(axis=0))
     possible = instance.useful & first_visits(arrays, SLACK)
     return np.where(possible, instance.price * legs, np.inf)
 

@@ -28,7 +28,7 @@ def route_bound(instance: Instance, lower: float, stop: StopCriterion) -> float:
         Asked every few milliseconds; HiGHS is told how long it leaves.
     """
     arrays = instance.arrays
-    if not always_whole(arrays):
+    if not always_whole(arrays) or not arrays.terms["metric"][0]:
         return np.inf
     pool = new_pool(arrays, 4 * CAPACITY)
     pricing = Pricing(arrays, pool, room=_ROOM, effort=np.inf, tolerance=2.0 * TOLERANCE)

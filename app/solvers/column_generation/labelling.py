@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_nogil
+from app.simulation.visit import airborne, ready
 from app.solvers.column_generation.pool import Pool, collect
 from app.solvers.column_generation.resources import VehicleResources
-from app.solvers.local_search.routes import NONE, lay
+from app.solvers.local_search.routes import lay
 from app.solvers.protocol import StopCriterion
 
 _MEMORY = 8
@@ -41,8 +42,6 @@ class NgNeighbourhoods(NamedTuple):
 
     Attributes
     ----------
-    leg
-        (N, N) distances between targets.
     near, known
         (N, G) and (N,) the targets whose visits are remembered at a target, itself first, and how many.
     order
@@ -51,7 +50,6 @@ class NgNeighbourhoods(NamedTuple):
         (N, N) the place of a target among those of another; NONE where it is forgotten there.
     """
 
-    leg: Floats
     near: Integers
     known: Integers
     order: Integers
@@ -94,8 +92,8 @@ class Labels(NamedTuple):
 
 def neighbourhoods_of(arrays: ProblemArrays, stop: StopCriterion) -> NgNeighbourhoods | None:
     """Find the neighbourhoods of the first problem of a stack; None if it was stopped."""
-    n = arrays.level.shape[1]
-    leg = np.ascontiguousarray(arrays.between[0])
+    n = arrays.areas["level"].shape[1]
+    leg = arrays.between[0].min(axis=0)
     size = min(_MEMORY, n)
     near = np.zeros((n, min(_MOST_MEMORY, n)), np.int64)
     order = np.empty((n, n), np.int64)
@@ -110,7 +108,7 @@ def neighbourhoods_of(arrays: ProblemArrays, stop: StopCriterion) -> NgNeighbour
     near[:, :size] = order[:, :size]
     place = np.full((n, n), NONE, np.int8)
     place[near[:, :size], np.arange(n)[:, None]] = np.arange(size)[None, :]
-    return NgNeighbourhoods(leg, near, np.full(n, size), order, place)
+    return NgNeighbourhoods(near, np.full(n, size), order, place)
 
 
 def new_labels(targets: int, resources: int, room: int) -> Labels:
@@ -175,7 +173,7 @@ def extend(
             i = labels.last[q]
             for nth in range(price.shape[0]):
                 j = ng.order[i, nth]
-                if _too_far(resources, labels, q, ng.leg[i, j]):
+                if resources.ordered and _too_far(resources, labels, q, resources.leg[i, j]):
                     break
                 seen = ng.place[j, i]
                 if price[j] <= 0.0 or (seen != NONE and labels.memory[q] >> seen & 1):
@@ -220,9 +218,12 @@ def _visit(
         labels.visits[q] = 1
     else:
         i = labels.last[parent]
-        leg = ng.leg[i, j]
+        leg, time = resources.leg[i, j], resources.time[i, j]
         for r in range(count):
-            labels.used[q, r] = labels.used[parent, r] + leg * resources.rate[r] + resources.amount[j, r]
+            used = labels.used[parent, r] + leg * resources.rate[r] + resources.amount[j, r]
+            if resources.pace[r] != 0.0:
+                used += time * resources.pace[r]
+            labels.used[q, r] = max(used, resources.least[j, r])
             if labels.used[q, r] > resources.most[j, r]:
                 return True
         labels.value[q] = labels.value[parent] + price[j] - resources.weight * leg
@@ -317,6 +318,7 @@ def collect_labels(
     targets: Integers,
     flown: Floats,
     clock: Floats,
+    aloft: Floats,
 ) -> None:
     """Put the routes of some labels into a pool, each target once.
 
@@ -330,8 +332,8 @@ def collect_labels(
         The UAV that the labels are of.
     labels, chosen
         Labels, and (C,) which of them.
-    targets, flown, clock
-        (S,), (S+1,) and (S+1,) scratch space.
+    targets, flown, clock, aloft
+        (S,) and three times (S+1,) scratch space.
     """
     for at in range(chosen.shape[0]):
         q = chosen[at]
@@ -347,6 +349,6 @@ def collect_labels(
             if not again:
                 targets[kept] = targets[s]
                 kept += 1
-        flown[0], clock[0] = 0.0, 0.0
-        if lay(arrays, i, targets, kept, 0, flown, clock):
+        flown[0], clock[0], aloft[0] = 0.0, ready(arrays, 0, i), airborne(arrays, 0, i)
+        if lay(arrays, i, targets, kept, 0, flown, clock, aloft):
             collect(arrays, pool, i, targets, kept, flown)

@@ -198,7 +198,7 @@ class Packing:
     def _costs(self, routes: Integers) -> Floats:
         """Return what routes cost, in largest levels, over what their UAVs cost where they are."""
         distance, uav = self._pool.distance[routes], self._pool.uav[routes]
-        return (self._arrays.weight[0] * distance - self._idle[uav]) / self._unit
+        return (self._arrays.terms["weight"][0] * distance - self._idle[uav]) / self._unit
 
     def _entries(self, routes: Integers) -> tuple[Integers, Integers, Floats]:
         """Return the entries of the columns of C routes: where each begins, (C + 1,), rows and values."""
@@ -247,8 +247,14 @@ def _steps(arrays: ProblemArrays) -> tuple[float, float]:
 
     Where distance is free, whole routes earn a sum of levels; most are written in steps of some size.
     """
-    levels, largest = arrays.level[0][arrays.need_total[0] > 0], largest_level(arrays)
-    grain = _common_measure(levels, 1e-9 * largest) if arrays.weight[0] == 0.0 else 0.0
+    levels, largest = arrays.areas["level"][0][arrays.areas["need_total"][0] > 0], largest_level(arrays)
+    counted = not (
+        arrays.terms["weight"][0]
+        or arrays.terms["decay"][0]
+        or arrays.terms["makespan"][0]
+        or arrays.terms["change"][0]
+    )
+    grain = _common_measure(levels, 1e-9 * largest) if counted else 0.0
     return largest, grain if grain >= _LEAST_GRAIN * largest else 0.0
 
 
@@ -264,10 +270,10 @@ def _common_measure(values: Floats, tolerance: float) -> float:
 
 def worth(arrays: ProblemArrays) -> Floats:
     """(N,) what a visit earns that meets the whole need; nothing where nothing is needed."""
-    return np.where(arrays.need_total[0] > 0, arrays.level[0], 0.0)
+    return np.where(arrays.areas["need_total"][0] > 0, arrays.areas["level"][0], 0.0)
 
 
 def idle_cost(arrays: ProblemArrays) -> Floats:
     """(M,) what a UAV costs that stays where it is."""
-    charged = arrays.charge_return[0] & ~arrays.ret[0]
-    return arrays.weight[0] * np.where(charged, arrays.start_home[0], 0.0)
+    charged = arrays.terms["charge_return"][0] & ~arrays.ret[0]
+    return arrays.terms["weight"][0] * np.where(charged, arrays.uavs["start_home"][0], 0.0)

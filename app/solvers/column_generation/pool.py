@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, alike
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays, alike
 from app.simulation.simulator import compiled
-from app.solvers.local_search.routes import NONE, charged_distance
+from app.solvers.local_search.routes import charged_distance
 
 CAPACITY = 8192
 """Routes that a pool holds at most; a full one takes no more."""
@@ -63,7 +63,7 @@ class Pool(NamedTuple):
 
 def often_whole(arrays: ProblemArrays) -> bool:
     """Whether most UAVs carry enough for most targets, so that combining routes is worth its time."""
-    active, wanted = ~arrays.ret[0], arrays.need_total[0] > 0
+    active, wanted = ~arrays.ret[0], arrays.areas["need_total"][0] > 0
     load, need = arrays.load[0][active], arrays.need[0][wanted]
     if not (len(load) and len(need)):
         return False

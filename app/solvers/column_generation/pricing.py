@@ -84,7 +84,8 @@ class Pricing:
         self._kinds: list[tuple[int, int, VehicleResources]] = []
         self._labels: dict[int, Labels] = {}
         steps = int(arrays.max_steps[0])
-        self._scratch = np.empty(steps, np.int64), np.empty(steps + 1), np.empty(steps + 1)
+        self._scratch = tuple(np.empty(steps + 1) for _ in range(3))
+        self._targets = np.empty(steps, np.int64)
         self._worth = worth(arrays)
         self._gain = _GAIN * float(self._worth.max(initial=0.0))
         self._idle, self._effort = idle_cost(arrays), effort
@@ -173,7 +174,7 @@ class Pricing:
             bound += many * max(value.max(initial=-np.inf), -self._idle[i])
             before = self._known()
             good = _most(value, least - promised, _BATCH)
-            collect_labels(self._arrays, self._pool, i, labels, good, *self._scratch)
+            collect_labels(self._arrays, self._pool, i, labels, good, self._targets, *self._scratch)
             if self._known() != before:
                 grew = True
             elif exact:

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.column_generation.pool import Pool, collect, new_pool
 from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (
     Change,
     apply,
+    extra_closing,
     extra_distance,
     extra_time,
     feasible,
@@ -23,8 +24,8 @@ from app.solvers.local_search.change import (
 )
 from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
 from app.solvers.local_search.routes import (
+    CLOSING,
     DISTANCE,
-    NONE,
     SATISFACTION,
     USELESS,
     Routes,
@@ -80,10 +81,10 @@ def replica(search: Search) -> Search:
 
 def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float, pool: Pool) -> Search:
     routes = empty_routes(arrays)
-    if arrays.charge_return[0]:
-        at_home = arrays.start_home[0][~arrays.ret[0]]
+    if arrays.terms["charge_return"][0]:
+        at_home = arrays.uavs["start_home"][0][~arrays.ret[0]]
         routes.total[DISTANCE] = at_home.sum()
-    best = np.array([-arrays.weight[0] * routes.total[DISTANCE]])
+    best = np.array([-arrays.terms["weight"][0] * routes.total[DISTANCE] - routes.total[CLOSING]])
     return Search(
         arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most, pool
     )
@@ -99,7 +100,7 @@ def set_routes(search: Search, actions: Integers) -> None:
     actions
         (S', M) joint actions of a legal plan.
     """
-    home = search.arrays.level.shape[1]
+    home = search.arrays.areas["level"].shape[1]
     for i in range(actions.shape[1]):
         targets = actions[:, i]
         set_route(search, i, np.ascontiguousarray(targets[targets < home]))
@@ -109,29 +110,37 @@ def set_routes(search: Search, actions: Integers) -> None:
 def actions_of(search: Search) -> Integers:
     """Return the incumbent as joint actions, (S, M)."""
     steps = search.best_target.shape[1]
-    home = search.arrays.level.shape[1]
+    home = search.arrays.areas["level"].shape[1]
     used = np.arange(steps)[None, :] < search.best_length[:, None]
     return np.where(used, search.best_target, home).T.copy()
 
 
 @compiled
 def set_route(search: Search, i: int, targets: Integers) -> None:
-    """Give UAV `i` a route that range and deadlines allow."""
-    change = search.change
+    """Give UAV `i` a route that rule 2 allows, whatever it unloads."""
+    arrays, routes, change = search.arrays, search.routes, search.change
     change.uav[1] = NONE
     for s in range(len(targets)):
         change.target[0, s] = targets[s]
-    propose(search.routes, change, 0, i, 0, len(targets))
-    if feasible(search.arrays, change):
-        apply(search.arrays, search.routes, change, extra_distance(search.arrays, search.routes, change))
+    propose(routes, change, 0, i, 0, len(targets))
+    if feasible(arrays, change):
+        _apply_whole(arrays, routes, change)
+
+
+@compiled
+def _apply_whole(arrays: ProblemArrays, routes: Routes, change: Change) -> None:
+    """Make a feasible proposal the current plan, whatever it earns."""
+    extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
+    apply(arrays, routes, change, extra, closing)
 
 
 @compiled
 def keep_best(search: Search) -> bool:
     """Make the current plan the incumbent if it is legal and better."""
     routes = search.routes
-    reward = routes.total[SATISFACTION] - search.arrays.weight[0] * routes.total[DISTANCE]
-    rounding = ROUNDING * (routes.total[SATISFACTION] + search.arrays.weight[0] * routes.total[DISTANCE])
+    cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
+    reward = routes.total[SATISFACTION] - cost
+    rounding = ROUNDING * (routes.total[SATISFACTION] + cost)
     if routes.total[USELESS] > 0.5 or reward <= search.best[0] + rounding:
         return False
     search.best[0] = reward
@@ -162,9 +171,10 @@ def drop_useless(search: Search) -> None:
                 for q in range(s, routes.length[i] - 1):
                     change.target[0, q] = routes.target[i, q + 1]
                 propose(routes, change, 0, i, s, routes.length[i] - 1)
-                # The way without it is not longer, so it is feasible; this works out distances and times.
-                feasible(arrays, change)
-                apply(arrays, routes, change, extra_distance(arrays, routes, change))
+                # Mostly the way without it is not longer, so it is feasible; otherwise the route ends here.
+                if not feasible(arrays, change):
+                    propose(routes, change, 0, i, s, s)
+                _apply_whole(arrays, routes, change)
     keep_best(search)
 
 
@@ -194,7 +204,7 @@ def anneal(
         Whether the routes that a kept change makes go to the search's pool.
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
-    weight = arrays.weight[0]
+    weight = arrays.terms[0].weight
     sum_up(arrays, routes)
     kept = 0
     temperature = hot
@@ -203,13 +213,13 @@ def anneal(
         temperature *= cooling
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
-        extra = extra_distance(arrays, routes, change)
-        price = (weight + thrift) * extra + haste * extra_time(routes, change)
+        extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
+        price = (weight + thrift) * extra + haste * extra_time(routes, change) + closing
         # What the change has to bring to be kept; most bring less, and of many that is known beforehand.
         least = temperature * math.log(1.0 - rng.random())
         if search.most - routes.total[SATISFACTION] + penalty * routes.total[USELESS] - price < least:
             continue
-        apply(arrays, routes, change, extra)
+        apply(arrays, routes, change, extra, closing)
         gain = (
             routes.total[SATISFACTION]
             - change.total[SATISFACTION]

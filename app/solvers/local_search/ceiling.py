@@ -20,7 +20,7 @@ def most_satisfaction(arrays: ProblemArrays) -> float:
     arrays
         A stack of one problem.
     """
-    wanted = arrays.need_total[0] > 0
+    wanted = arrays.areas["need_total"][0] > 0
     worth = worths(arrays)[wanted]
     need = arrays.need[0][wanted]
     load = np.where(arrays.ret[0][:, None], 0.0, arrays.load[0])

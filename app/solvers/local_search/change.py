@@ -11,16 +11,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
-from app.simulation.visit import earned_by, left_of
+from app.simulation.visit import (
+    bonus_of,
+    closing_cost,
+    decays,
+    discount,
+    earned_by,
+    has_bonus,
+    has_closing_cost,
+    left_of,
+)
 from app.solvers.local_search.routes import (
+    CLOSING,
     DISTANCE,
-    NONE,
     SATISFACTION,
     USELESS,
     Routes,
+    changes_in,
     charged_distance,
+    landing_of,
     lay,
     link,
     unlink,
@@ -38,14 +49,16 @@ class Change(NamedTuple):
         (2,) first visit of each that may differ.
     target, length
         (2, S) and (2,) their new routes; after :func:`apply`, the routes before it.
-    flown, clock
+    flown, clock, aloft
         (2, S+1) likewise.
     journal, journal_length
         (S*M,) slots whose evaluation changed, and (1,) how many.
     load, need, earned, useless
         (S*M, …) their values before, by place in the journal.
+    landing, changes
+        (2,) when the routes end, and what they leave out of ``start_plan``, where that costs reward.
     total
-        (3,) the totals before.
+        (4,) the totals before.
     queue, queue_length
         (S*M,) a binary heap of slots to work off, and (1,) its length.
     queued
@@ -60,12 +73,15 @@ class Change(NamedTuple):
     length: Integers
     flown: Floats
     clock: Floats
+    aloft: Floats
     journal: Integers
     journal_length: Integers
     load: Floats
     need: Floats
     earned: Floats
     useless: Flags
+    landing: Floats
+    changes: Floats
     total: Floats
     queue: Integers
     queue_length: Integers
@@ -85,13 +101,16 @@ def new_change(arrays: ProblemArrays) -> Change:
         length=np.zeros(2, np.int64),
         flown=np.zeros((2, steps + 1)),
         clock=np.zeros((2, steps + 1)),
+        aloft=np.zeros((2, steps + 1)),
         journal=np.zeros(slots, np.int64),
         journal_length=np.zeros(1, np.int64),
         load=np.zeros((slots, k)),
         need=np.zeros((slots, k)),
         earned=np.zeros(slots),
         useless=np.zeros(slots, np.bool_),
-        total=np.zeros(3),
+        landing=np.zeros(2),
+        changes=np.zeros(2),
+        total=np.zeros(4),
         queue=np.zeros(slots, np.int64),
         queue_length=np.zeros(1, np.int64),
         queued=np.zeros(slots, np.int64),
@@ -110,16 +129,17 @@ def propose(routes: Routes, change: Change, side: int, i: int, begin: int, lengt
         change.target[side, s] = routes.target[i, s]
     change.flown[side, begin] = routes.flown[i, begin]
     change.clock[side, begin] = routes.clock[i, begin]
+    change.aloft[side, begin] = routes.aloft[i, begin]
 
 
 @compiled
 def feasible(arrays: ProblemArrays, change: Change) -> bool:
-    """Whether ranges and deadlines allow the proposed routes; works out their distances and times."""
+    """Whether rule 2 allows the proposed routes, whatever they unload; works out their times."""
     for side in range(2):
         i = change.uav[side]
         if i != NONE and not lay(
             arrays, i, change.target[side], change.length[side], change.begin[side],
-            change.flown[side], change.clock[side],
+            change.flown[side], change.clock[side], change.aloft[side],
         ):  # fmt: skip
             return False
     return True
@@ -138,6 +158,24 @@ def extra_distance(arrays: ProblemArrays, routes: Routes, change: Change) -> flo
 
 
 @compiled
+def extra_closing(arrays: ProblemArrays, routes: Routes, change: Change) -> float:
+    """What makespan and changes of the proposed routes cost over those of the present ones."""
+    if not has_closing_cost(arrays, 0):
+        return 0.0
+    makespan, changes = 0.0, 0.0
+    for i in range(routes.length.shape[0]):
+        landing, missing = routes.landing[i], routes.changes[i]
+        for side in range(2):
+            if change.uav[side] == i:
+                landing = landing_of(arrays, i, change.target[side], change.length[side], change.clock[side])
+                missing = changes_in(arrays, i, change.target[side], change.length[side])
+                change.landing[side], change.changes[side] = landing, missing
+        makespan = max(makespan, landing)
+        changes += missing
+    return closing_cost(arrays, 0, makespan, changes) - routes.total[CLOSING]
+
+
+@compiled
 def extra_time(routes: Routes, change: Change) -> float:
     """Time of the proposed routes over that of the present ones."""
     extra = 0.0
@@ -149,8 +187,8 @@ def extra_time(routes: Routes, change: Change) -> float:
 
 
 @compiled
-def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float) -> None:
-    """Make the proposal the current plan; `extra` is its :func:`extra_distance`.
+def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float, closing: float) -> None:
+    """Make the proposal the current plan; `extra` is its :func:`extra_distance`, `closing` as they say.
 
     The totals before stay readable in ``change.total`` until the next change.
     """
@@ -158,9 +196,10 @@ def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float) -
     change.number[0] += 1
     change.journal_length[0] = 0
     change.queue_length[0] = 0
-    for c in range(3):
+    for c in range(routes.total.shape[0]):
         change.total[c] = routes.total[c]
     routes.total[DISTANCE] += extra
+    routes.total[CLOSING] += closing
     _take_out(routes, change)
     _exchange(routes, change)
     for side in range(2):
@@ -201,7 +240,7 @@ def undo(routes: Routes, change: Change) -> None:
             routes.need[slot, k] = change.need[q, k]
         routes.earned[slot] = change.earned[q]
         routes.useless[slot] = change.useless[q]
-    for c in range(3):
+    for c in range(routes.total.shape[0]):
         routes.total[c] = change.total[c]
 
 
@@ -242,6 +281,12 @@ def _exchange(routes: Routes, change: Change) -> None:
                 change.clock[side, s + 1],
             )
             change.flown[side, s + 1], change.clock[side, s + 1] = flown, clock
+            routes.aloft[i, s + 1], change.aloft[side, s + 1] = (
+                change.aloft[side, s + 1],
+                routes.aloft[i, s + 1],
+            )
+        routes.landing[i], change.landing[side] = change.landing[side], routes.landing[i]
+        routes.changes[i], change.changes[side] = change.changes[side], routes.changes[i]
 
 
 @compiled
@@ -272,6 +317,10 @@ def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) 
         if unloaded > 0.0:
             useless = False
             earned += earned_by(arrays, 0, j, unloaded)
+            if has_bonus(arrays, 0):
+                earned += bonus_of(arrays, 0, j, k, need, unloaded)
+    if decays(arrays, 0):
+        earned *= discount(arrays, 0, routes.clock[i, s + 1] - arrays.areas[0, j].service)
     routes.earned[slot], routes.useless[slot] = earned, useless
     routes.total[SATISFACTION] += earned
     if useless:

@@ -65,7 +65,7 @@ class Combination:
             self._visits = int(searches[0].routes.length.sum())
             self._pricing = Pricing(arrays, self.searches[0].pool)
             self._rng = np.random.default_rng(_SEED)
-            self._always_whole = always_whole(arrays)
+            self._complete = always_whole(arrays) and arrays.terms["metric"][0]
             if left < math.inf:
                 self.seconds = min(max(_LAST_SHARE * left, _LEAST_S), _MOST_S)
 
@@ -127,7 +127,7 @@ class Combination:
             latest = self._dive_on(packing, relaxed, dived_on)
             if latest is not None:
                 self._thin(latest)
-        self.proven = self._always_whole and self._pricing.bound < self._next()
+        self.proven = self._complete and self._pricing.bound < self._next()
 
     def _dive_on(self, packing: Packing, relaxed: Relaxation, ended: StopCriterion) -> Relaxation | None:
         """Dive some times more, each time elsewhere; return the relaxation after that."""

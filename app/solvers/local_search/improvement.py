@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.simulation.legs import UNREACHABLE
 from app.solvers.local_search.annealing import ROUNDING, Search, actions_of, anneal, drop_useless, set_routes
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
@@ -175,7 +176,7 @@ def _round(
     largest, scale = largest_level(search.arrays), common_level(search.arrays)
     leg = _neighbour_leg(search)
     haste, thrift = 0.0, 0.0
-    if float(search.arrays.weight[0]) * leg < _FREE * scale:
+    if float(search.arrays.terms["weight"][0]) * leg < _FREE * scale:
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
         haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
@@ -219,8 +220,8 @@ def _silent(_share: float) -> None:
 def _neighbour_leg(search: Search) -> float:
     """Return the mean distance between targets that are neighbours; 0 where there are none apart."""
     near = search.near
-    legs = search.arrays.between[0][near.wanted[:, None], near.near_target[near.wanted, :3]]
-    legs = legs[np.isfinite(legs) & (legs > 0)]
+    legs = search.arrays.between[0, 0][near.wanted[:, None], near.near_target[near.wanted, :3]]
+    legs = legs[(legs < UNREACHABLE) & (legs > 0)]
     return float(legs.mean()) if legs.size else 0.0
 
 
@@ -242,8 +243,14 @@ def _guides(search: Search, cost: float, most: float, leg: float) -> tuple[float
     arrays, near = search.arrays, search.near
     if leg == 0.0:
         return 0.0, 0.0
-    far = float(arrays.start_target[0][np.ix_(near.active, near.wanted)].mean())
+    ways = arrays.start_target[0][np.ix_(near.active, near.wanted)]
+    if (ways >= UNREACHABLE).any():
+        ways = ways[ways < UNREACHABLE]
+    far = float(ways.mean()) if ways.size else 0.0
     rate = min(cost / leg, most / far) if far > 0.0 else cost / leg
-    if np.isfinite(arrays.deadline[0][near.wanted]).any():
-        return rate * float(arrays.speed[0][near.active].mean()), 0.0
-    return 0.0, max(0.0, rate - float(arrays.weight[0]))
+    if (
+        np.isfinite(arrays.areas["deadline"][0][near.wanted]).any()
+        or arrays.uavs["watched"][0, near.active].any()
+    ):
+        return rate * float(arrays.uavs["speed"][0][near.active].mean()), 0.0
+    return 0.0, max(0.0, rate - float(arrays.terms["weight"][0]))

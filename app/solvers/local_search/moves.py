@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Flags, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.simulation.visit import START, cost_of, earned_by, leg, way_home
 from app.solvers.local_search.change import Change, propose
-from app.solvers.local_search.routes import NONE, Routes
+from app.solvers.local_search.routes import Routes
 
 NEAR = 24
 """Length of the lists of near targets."""
@@ -48,9 +48,9 @@ class Neighbourhood(NamedTuple):
 
 def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     """Make the lists for the first problem of a stack; ``active`` or ``wanted`` may be empty."""
-    wanted = np.flatnonzero(arrays.need_total[0] > 0)
+    wanted = np.flatnonzero(arrays.areas["need_total"][0] > 0)
     length = max(1, min(NEAR, len(wanted) - 1))
-    between = arrays.between[0].copy()
+    between = arrays.between[0].min(axis=0)
     np.fill_diagonal(between, np.inf)
     near_start = _nearest(arrays.start_target[0], wanted, length)
     reluctant = np.zeros(len(near_start), np.bool_)
@@ -87,7 +87,7 @@ def _find_reluctant(arrays: ProblemArrays, near_start: Integers, reluctant: Flag
             for k in range(arrays.load.shape[2]):
                 unloaded += min(arrays.load[0, i, k], arrays.need[0, j, k])
             way = leg(arrays, 0, i, START, j)
-            if arrays.charge_return[0]:
+            if arrays.terms[0].charge_return:
                 way += way_home(arrays, 0, i, j) - way_home(arrays, 0, i, START)
             if unloaded > 0.0 and earned_by(arrays, 0, j, unloaded) < cost_of(arrays, 0, way):
                 reluctant[i] = True

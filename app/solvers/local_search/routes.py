@@ -12,23 +12,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
 from app.simulation.visit import (
     START,
-    arrival_after,
+    air_length,
+    aloft_after,
+    closing_cost,
     departure_after,
+    exceeds_endurance,
     farthest,
     flown_with_return,
+    has_closing_cost,
+    is_committed_elsewhere,
     is_late,
+    is_watched,
+    lands_late,
     leg,
+    leg_time,
+    time_home,
     way_home,
 )
 
-NONE = -1
-"""End of a linked list."""
-
-SATISFACTION, DISTANCE, USELESS = 0, 1, 2
+SATISFACTION, DISTANCE, USELESS, CLOSING = 0, 1, 2, 3
 """Columns of ``Routes.total``."""
 
 
@@ -39,8 +45,9 @@ class Routes(NamedTuple):
     ----------
     target, length
         (M, S) targets in order and (M,) visits of each route.
-    flown, clock
-        (M, S+1) distance flown and time passed in the plan before each visit, and at the end.
+    flown, clock, aloft
+        (M, S+1) air length flown in the plan, the time, and the time in the air before each visit, and at
+        the end; the last one of UAVs for which it counts.
     load, need
         (S*M, K) by slot: what the UAV carries and what the target needs just before the visit.
     earned
@@ -49,14 +56,18 @@ class Routes(NamedTuple):
         (S*M,) visits that unload nothing; a plan with one is not legal.
     first, following, preceding
         (N,), (S*M,), (S*M,): the visits of each target in order, as a doubly linked list of slots.
+    landing, changes
+        (M,) when a UAV has landed, 0 if it has no visit, and how many of its visits of ``start_plan`` are
+        missing; where they cost reward.
     total
-        (3,) satisfaction, distance and number of useless visits.
+        (4,) satisfaction, distance, number of useless visits, and what makespan and changes cost.
     """
 
     target: Integers
     length: Integers
     flown: Floats
     clock: Floats
+    aloft: Floats
     load: Floats
     need: Floats
     earned: Floats
@@ -64,6 +75,8 @@ class Routes(NamedTuple):
     first: Integers
     following: Integers
     preceding: Integers
+    landing: Floats
+    changes: Floats
     total: Floats
 
 
@@ -72,11 +85,12 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
     m, n, k = arrays.shape
     steps = int(arrays.max_steps[0])
     slots = steps * m
-    return Routes(
+    routes = Routes(
         target=np.zeros((m, steps), np.int64),
         length=np.zeros(m, np.int64),
         flown=np.zeros((m, steps + 1)),
-        clock=np.zeros((m, steps + 1)),
+        clock=np.repeat(arrays.uavs["ready"][0][:, None], steps + 1, axis=1),
+        aloft=np.repeat(arrays.uavs["airborne"][0][:, None], steps + 1, axis=1),
         load=np.zeros((slots, k)),
         need=np.zeros((slots, k)),
         earned=np.zeros(slots),
@@ -84,8 +98,13 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
         first=np.full(n, NONE, np.int64),
         following=np.full(slots, NONE, np.int64),
         preceding=np.full(slots, NONE, np.int64),
-        total=np.zeros(3),
+        landing=np.zeros(m),
+        changes=np.zeros(m),
+        total=np.zeros(4),
     )
+    if arrays.terms["makespan"][0] or arrays.terms["change"][0]:
+        note_ends(arrays, routes)
+    return routes
 
 
 @compiled
@@ -118,9 +137,18 @@ def unlink(routes: Routes, slot: int, target: int) -> int:
 
 @compiled
 def lay(
-    arrays: ProblemArrays, i: int, targets: Integers, length: int, begin: int, flown: Floats, clock: Floats
+    arrays: ProblemArrays,
+    i: int,
+    targets: Integers,
+    length: int,
+    begin: int,
+    flown: Floats,
+    clock: Floats,
+    aloft: Floats,
 ) -> bool:
-    """Work out distances and times of a route from visit `begin` on; False where range or deadline forbid it.
+    """Work out distances and times of a route from visit `begin` on; False where rule 2 forbids it.
+
+    Whether its visits unload anything is not looked at.
 
     Parameters
     ----------
@@ -131,21 +159,28 @@ def lay(
     targets, length
         (S,) its targets in order, and how many they are.
     begin
-        First visit that is new; ``flown[:begin + 1]`` and ``clock[:begin + 1]`` are right already.
-    flown, clock
+        First visit that is new; ``flown[:begin + 1]`` and so on are right already.
+    flown, clock, aloft
         (S+1,) overwritten from ``begin + 1`` on.
     """
-    most = farthest(arrays.voyage[0, i]) - arrays.dis[0, i]
+    most = farthest(arrays.uavs[0, i].voyage) - arrays.uavs[0, i].dis
+    watched = is_watched(arrays, 0, i)
     for s in range(begin, length):
         j = targets[s]
-        way = leg(arrays, 0, i, START if s == 0 else targets[s - 1], j)
-        flown[s + 1] = flown[s] + way
+        at = START if s == 0 else targets[s - 1]
+        way = leg(arrays, 0, i, at, j)
+        time = leg_time(arrays, 0, i, at, j, way)
+        flown[s + 1] = flown[s] + air_length(arrays, 0, i, way, time)
         if flown_with_return(arrays, 0, i, j, flown[s + 1]) > most:
             return False
-        arrival = arrival_after(arrays, 0, i, clock[s], way)
-        if is_late(arrival, arrays.deadline[0, j]):
+        arrival = clock[s] + time
+        if is_late(arrival, arrays.areas[0, j].deadline) or is_committed_elsewhere(arrays, 0, i, s, j):
             return False
         clock[s + 1] = departure_after(arrays, 0, j, arrival)
+        if watched:
+            aloft[s + 1] = aloft_after(arrays, 0, i, s == 0, aloft[s], clock[s], arrival, clock[s + 1], j)
+            if exceeds_endurance(arrays, 0, i, j, aloft[s + 1]) or lands_late(arrays, 0, i, j, clock[s + 1]):
+                return False
     return True
 
 
@@ -159,12 +194,50 @@ def sum_up(arrays: ProblemArrays, routes: Routes) -> None:
             satisfaction += routes.earned[s * m + i]
         distance += charged_distance(arrays, i, routes.target[i], routes.length[i], routes.flown[i])
     routes.total[SATISFACTION], routes.total[DISTANCE] = satisfaction, distance
+    if has_closing_cost(arrays, 0):
+        note_ends(arrays, routes)
 
 
 @compiled
 def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: int, flown: Floats) -> float:
     """Distance of a route as far as it costs reward."""
-    distance = flown[length]
-    if arrays.charge_return[0] and not arrays.ret[0, i]:
+    if not arrays.terms[0].in_wind:
+        distance = flown[length]
+    else:
+        distance = 0.0
+        for s in range(length):
+            distance += leg(arrays, 0, i, START if s == 0 else targets[s - 1], targets[s])
+    if arrays.terms[0].charge_return and not arrays.ret[0, i]:
         distance += way_home(arrays, 0, i, START if length == 0 else targets[length - 1])
     return distance
+
+
+@compiled
+def landing_of(arrays: ProblemArrays, i: int, targets: Integers, length: int, clock: Floats) -> float:
+    """When a UAV has landed after its route; 0 if it has no visit."""
+    return 0.0 if length == 0 else clock[length] + time_home(arrays, 0, i, targets[length - 1])
+
+
+@compiled
+def changes_in(arrays: ProblemArrays, i: int, targets: Integers, length: int) -> float:
+    """How many of a UAV's visits of ``start_plan`` are missing on a route."""
+    missing = 0.0
+    for w in range(arrays.before.shape[2]):
+        there = arrays.before[0, i, w] == NONE
+        for s in range(length):
+            there = there or targets[s] == arrays.before[0, i, w]
+        if not there:
+            missing += 1.0
+    return missing
+
+
+@compiled
+def note_ends(arrays: ProblemArrays, routes: Routes) -> None:
+    """Write down what the ends of all routes cost."""
+    makespan, changes = 0.0, 0.0
+    for i in range(routes.length.shape[0]):
+        routes.landing[i] = landing_of(arrays, i, routes.target[i], routes.length[i], routes.clock[i])
+        routes.changes[i] = changes_in(arrays, i, routes.target[i], routes.length[i])
+        makespan = max(makespan, routes.landing[i])
+        changes += routes.changes[i]
+    routes.total[CLOSING] = closing_cost(arrays, 0, makespan, changes)

@@ -9,13 +9,13 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import compile_problem
-from app.solvers.greedy import greedy_plan
-from app.solvers.local_search.annealing import Search, actions_of, new_search, replica, set_routes
+from app.solvers.local_search.annealing import Search, actions_of, new_search, replica
 from app.solvers.local_search.effort import default_moves, default_restarts, moves_within_limit
 from app.solvers.local_search.improvement import Cooling, Watch, improve_together
 from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.seeds import seed_sequence
+from app.solvers.start import begin_search
 from app.solvers.stop import WhileSpare
 
 
@@ -27,10 +27,10 @@ class LocalSearch:
         self._context = context
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
-        """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the greedy rule's plan."""
+        """See :class:`~app.solvers.protocol.Solver`; epoch 0 is the plan that it begins from."""
         arrays = compile_problem(problem)
         search, history = new_search(arrays), History()
-        set_routes(search, greedy_plan(problem, stop).as_array())
+        begin_search(search, problem, stop)
         moves, restarts = how_long(search, self.parameters.moves, self.parameters.restarts, stop)
         history.add(0, float(search.best[0]))
         watch = watching(search, history, report)

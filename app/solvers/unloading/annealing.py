@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.plan import Actions
-from app.simulation.arrays import Floats, ProblemArrays
-from app.simulation.deliveries import NONE, Unloading, Visits, new_unloading, serve
+from app.simulation.arrays import NONE, Floats, ProblemArrays
+from app.simulation.deliveries import Unloading, Visits, new_unloading, serve
 from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
-from app.solvers.local_search.change import Change, apply, extra_distance, feasible, undo
+from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, feasible, undo
 from app.solvers.local_search.moves import draw_move
-from app.solvers.local_search.routes import DISTANCE, Routes
+from app.solvers.local_search.routes import CLOSING, DISTANCE, Routes
 
 MOVES, WORK, SATISFACTION = 0, 1, 2
 """Places in ``PlannedSearch.tally``."""
@@ -77,8 +77,9 @@ def visits_of_routes(routes: Routes) -> Visits:
 def keep_if_best(planned: PlannedSearch) -> None:
     """Make the current plan the incumbent if it is better."""
     search, routes = planned.search, planned.search.routes
-    reward = planned.tally[SATISFACTION] - search.arrays.weight[0] * routes.total[DISTANCE]
-    rounding = ROUNDING * (planned.tally[SATISFACTION] + search.arrays.weight[0] * routes.total[DISTANCE])
+    cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
+    reward = planned.tally[SATISFACTION] - cost
+    rounding = ROUNDING * (planned.tally[SATISFACTION] + cost)
     if reward > search.best[0] + rounding:
         search.best[0] = reward
         for i in range(routes.length.shape[0]):
@@ -122,12 +123,12 @@ def anneal_planned(
         tally[WORK] += 1.0
         if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
             continue
-        extra = extra_distance(arrays, routes, change)
-        price = arrays.weight[0] * extra
+        extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
+        price = arrays.terms[0].weight * extra + closing
         least = temperature * math.log(1.0 - rng.random())
         if search.most - tally[SATISFACTION] - price < least:
             continue
-        apply(arrays, routes, change, extra)
+        apply(arrays, routes, change, extra, closing)
         concerned = _concerned(planned, routes, change)
         before = 0.0
         for q in range(concerned):

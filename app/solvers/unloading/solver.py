@@ -68,6 +68,8 @@ class PlannedUnloading:
             return self.algorithm.solve(problem, seed, stop, report)
         greedy = replace(problem, objective=replace(problem.objective, unloading="greedy"))
         incumbent = _Incumbent(problem)
+        if problem.start_plan:
+            incumbent.consider(Plan(problem.start_plan))
 
         def told(progress: Progress) -> None:
             incumbent.consider(progress.incumbent)

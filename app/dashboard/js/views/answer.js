@@ -2,7 +2,7 @@
 
 import { paint } from "../colours.js";
 import { amounts, h, number, shown } from "../dom.js";
-import { sum } from "../plan.js";
+import { called, names, sum, waiting } from "../plan.js";
 import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { requestedBy } from "../problem.js";
@@ -15,6 +15,7 @@ const long = { routes: null, unmet: null, timeline: null };
 
 function figures(answer) {
   const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight, 3], ["Seconds", answer.elapsed_s, 3]];
+  for (const [title, value] of [["Makespan", answer.makespan], ["Changes", answer.changes]]) if (typeof value === "number") all.splice(-2, 0, [title, value]);
   return h("dl", { class: "figures", id: "figures" }, all.map(([title, value, digits]) => figure(title, value, digits)), boundFigures(answer));
 }
 
@@ -40,12 +41,18 @@ function source(answer) {
   return h("p", { class: "hint", id: "source" }, how, ". Policy ", h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
 }
 
-function routeRows(route) {
+/** What stands beside an arrival where the visit begins later. */
+function waitHint(uav, stop, n) {
+  const { time, onGround } = waiting(uav, stop, n);
+  return time > 0 ? h("p", { class: "hint" }, "waits ", number(time), onGround ? " on the ground, begins " : ", begins ", number(stop.begin_time)) : null;
+}
+
+function routeRows(uav, route, nameOf) {
   return route.stops.map((stop, n) => {
     const key = paint(h("span", { class: "key", "aria-hidden": "true" }), route.uav_id);
-    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, route.uav_id), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
+    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, called(uav)), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
     return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
-      h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, stop.target_id), h("td", { class: "num" }, number(stop.arrival_time)),
+      h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, nameOf(stop.target_id)), h("td", { class: "num" }, number(stop.arrival_time), waitHint(uav, stop, n)),
       h("td", { class: "num" }, amounts(stop.delivered)));
   });
 }
@@ -55,7 +62,9 @@ function routesTable(problem, answer) {
   const out = answer.routes.filter((route) => route.stops.length);
   if (!out.length) return h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance.");
   const body = h("tbody", {});
-  long.routes = new Portions(body, out, routeRows, (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
+  const uavs = new Map(problem.uavs.map((uav) => [uav.id, uav]));
+  const nameOf = names(problem.targets);
+  long.routes = new Portions(body, out, (route) => routeRows(uavs.get(route.uav_id), route, nameOf), (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
   return h("details", { open: true }, h("summary", {}, `Routes of ${out.length} of ${problem.uavs.length} UAVs`),
     h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [1, 3, 4].includes(at) ? "num" : null }, title)))), body)));
 }
@@ -63,9 +72,10 @@ function routesTable(problem, answer) {
 function unmetList(problem, answer) {
   const title = answer.unmet.length ? `Unmet needs of ${answer.unmet.length} of ${problem.targets.length} areas` : `All ${problem.targets.length} areas get all they need`;
   const needs = new Map(problem.targets.map((target) => [target.id, sum(requestedBy(target))]));
+  const nameOf = names(problem.targets);
   const item = (unmet) =>
     h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
-      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", onclick: () => select({ kind: "targets", id: unmet.target_id }) }, unmet.target_id), unmet.code && h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
+      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", title: unmet.target_id, onclick: () => select({ kind: "targets", id: unmet.target_id }) }, nameOf(unmet.target_id)), unmet.code && h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
       h("p", {}, "lacks ", amounts(unmet.remaining), h("span", { class: "hint" }, ` of ${shown(needs.get(unmet.target_id))}`)),
       h("p", { class: "hint" }, unmet.reason), typeof unmet.remedy === "string" && h("p", { class: "hint" }, `Would help: ${unmet.remedy}`));
   const list = h("ul", { class: "unmet", id: "unmet" });

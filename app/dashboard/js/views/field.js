@@ -4,7 +4,7 @@ import { ApiError } from "../api.js";
 import { h, notify, number, shortAmounts, shown } from "../dom.js";
 import { showPlan, undo } from "../history.js";
 import { changes, missionEnd, moments, problemAt, remainder, uavAt, withNeeds } from "../mid_mission.js";
-import { sum } from "../plan.js";
+import { called, names, sum } from "../plan.js";
 import { answeredBy } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { freeId } from "../problem.js";
@@ -197,6 +197,7 @@ function drawUavs(now) {
   const { answer, problem } = plan();
   const { clock, lost } = get().mission;
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
+  const nameOf = names([...problem.targets, ...now.targets]);
   const body = h("tbody", {});
   parts.uavs.replaceChildren(
     h("table", { "data-testid": "field-uavs" },
@@ -204,10 +205,10 @@ function drawUavs(now) {
       body));
   const rows = new Portions(body, problem.uavs, (uav, i) => {
         const is = uavAt(problem, answer, i, clock);
-        const doing = { flying: `to ${is.next}`, unloading: `at ${is.next}` }[is.doing] ?? is.doing;
+        const doing = { flying: `to ${nameOf(is.next)}`, unloading: `at ${nameOf(is.next)}` }[is.doing] ?? is.doing;
         const gone = lost.includes(uav.id);
         return h("tr", { class: gone ? "lost" : null, "data-uav": uav.id },
-          h("th", { scope: "row" }, uav.id),
+          h("th", { scope: "row", title: uav.id }, called(uav)),
           h("td", {}, gone ? "lost" : doing),
           h("td", { class: "n" }, gone ? "–" : number(uav.voyage - is.flown)),
           h("td", { class: "n load" }, gone ? "–" : shortAmounts(left.get(uav.id).loadlist, " · ")),
@@ -233,7 +234,7 @@ function drawAreas(now) {
       body));
   const rows = new Portions(body, [...now.targets].sort((a, b) => fresh.has(b.id) - fresh.has(a.id)), (target) =>
         h("tr", { class: fresh.has(target.id) ? "new" : target.id in happened ? "changed" : null, "data-area": target.id },
-          h("th", { scope: "row" }, target.id,
+          h("th", { scope: "row", title: target.id }, called(target),
             fresh.has(target.id) && h("span", { class: "place" }, field(target, "x", "x"), field(target, "y", "y"))),
           h("td", {}, field(target, "level", "level")),
           h("td", {}, needFields(target)),
@@ -343,12 +344,13 @@ async function again() {
 
 /** What the newest plan changed, as long as it is the mission on screen. */
 function drawOutcome() {
-  const { answer, mission: { outcome: difference } } = get();
+  const { answer, answerProblem, mission: { outcome: difference } } = get();
   if (!difference) {
     parts.dock.replaceChildren();
     return;
   }
-  const list = (ids) => (ids.length ? ids.join(" → ") : "home");
+  const [uavOf, areaOf] = [names(answerProblem.uavs), names(answerProblem.targets)];
+  const list = (ids) => (ids.length ? ids.map(areaOf).join(" → ") : "home");
   const percent = (share) => (share === null ? "–" : `${Math.round(100 * share)} %`);
   const gained = answer.reward - difference.kept.reward;
   const moved = difference.areas.filter(({ before, after }) => Math.abs((before ?? 0) - (after ?? 0)) > 1e-6);
@@ -362,12 +364,12 @@ function drawOutcome() {
           h("thead", {}, h("tr", {}, ["UAV", "Before", "Now", ""].map((title) => h("th", { scope: "col" }, title)))),
           h("tbody", {}, difference.routes.filter((route) => route.kind === "lost" || route.before.length || route.after.length).map((route) =>
             h("tr", { "data-uav": route.uav_id, class: route.kind },
-              h("th", { scope: "row" }, route.uav_id), h("td", {}, list(route.before)),
+              h("th", { scope: "row", title: route.uav_id }, uavOf(route.uav_id)), h("td", {}, list(route.before)),
               h("td", {}, route.kind === "lost" ? "–" : list(route.after)), h("td", {}, h("span", { class: "chip" }, route.kind)))))),
         h("table", {},
           h("thead", {}, h("tr", {}, ["Area", "Met before", "Met now"].map((title, i) => h("th", { scope: "col", class: i ? "n" : null }, title)))),
           h("tbody", {}, moved.length
             ? moved.map((area) => h("tr", { "data-area": area.target_id },
-              h("th", { scope: "row" }, area.target_id), h("td", { class: "n" }, percent(area.before)), h("td", { class: "n" }, percent(area.after))))
+              h("th", { scope: "row", title: area.target_id }, areaOf(area.target_id)), h("td", { class: "n" }, percent(area.before)), h("td", { class: "n" }, percent(area.after))))
             : h("tr", {}, h("td", { colspan: "3" }, "Every area gets what it would have got.")))))));
 }

@@ -2,6 +2,7 @@
 
 import { address, hasKey, send } from "../api.js";
 import { download, h, notify } from "../dom.js";
+import { names } from "../plan.js";
 import { outOfDate, staleNote } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { get, subscribe } from "../state.js";
@@ -76,9 +77,10 @@ function draw() {
   for (const { made, only } of parts.rows.values()) made.hidden = only !== null && only !== delivery;
   const kept = parts.uav.value;
   const flying = answer ? answer.routes.filter((route) => route.stops.length || route.return_distance > 0) : [];
+  const nameOf = names(answerProblem?.uavs ?? []);
   parts.uav.replaceChildren(
     h("option", { value: "" }, `all ${flying.length} that fly (ZIP)`),
-    ...flying.map((route) => h("option", { value: route.uav_id }, route.uav_id)));
+    ...flying.map((route) => h("option", { value: route.uav_id }, nameOf(route.uav_id))));
   if (flying.some((route) => route.uav_id === kept)) parts.uav.value = kept;
   const geographic = answerProblem?.crs === "wgs84";
   for (const button of parts.flight.children) button.disabled = !answer || !geographic;

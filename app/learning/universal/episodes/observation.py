@@ -17,10 +17,11 @@ import numpy as np
 from app.learning.compute.kernels import Float32s
 from app.learning.universal.network.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import Episodes, compiled, leg_home, leg_to, verdict
+from app.simulation.legs import UNREACHABLE
+from app.simulation.simulator import Episodes, compiled, earned_now, leg_home, leg_to, verdict
 from app.simulation.visit import (
     ALLOWED,
-    arrival_after,
+    air_length,
     cost_of,
     departure_after,
     earned_by,
@@ -29,6 +30,7 @@ from app.simulation.visit import (
     is_out_of_range,
     left_of,
     leg,
+    leg_time,
     way_home,
 )
 
@@ -37,6 +39,9 @@ FOLLOW_UPS = 16
 
 LARGEST_LEVEL = 1e6
 """Bound of the level of a target that needs nothing, against those that do: keeps single precision finite."""
+
+_FAR = 10.0
+"""Spans that a leg is long at most; a leg that does not exist is that long."""
 
 FORBIDDEN = -np.inf
 """Value of a visit that is not allowed."""
@@ -71,13 +76,24 @@ class VisitGains(NamedTuple):
 
 def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
     """Return what distances, rewards and times are divided by, (P,) each; never 0."""
-    far = np.maximum(arrays.start_target.max(axis=(1, 2)), arrays.between.max(axis=(1, 2)))
-    span = np.maximum(np.maximum(far, arrays.home.max(axis=(1, 2))), arrays.start_home.max(axis=1))
+    far = np.maximum(_longest(arrays.start_target), _longest(arrays.between))
+    span = np.maximum(np.maximum(far, _longest(arrays.home)), arrays.uavs["start_home"].max(axis=1))
     span = np.where(span > 0, span, 1.0)
-    level = np.where(arrays.need_total > 0, arrays.level, 0.0).max(axis=1)
+    level = np.where(arrays.areas["need_total"] > 0, arrays.areas["level"], 0.0).max(axis=1)
     flying = ~arrays.ret
-    speed = np.where(flying, arrays.speed, 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
+    speed = np.where(flying, arrays.uavs["speed"], 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
     return span, np.where(level > 0, level, 1.0), span / np.where(speed > 0, speed, 1.0)
+
+
+def _longest(legs: Floats) -> Floats:
+    """Return the longest leg of each problem that there is, (P,)."""
+    return legs.max(axis=tuple(range(1, legs.ndim)), where=legs < UNREACHABLE, initial=0.0)
+
+
+def nearness(arrays: ProblemArrays, span: Floats) -> Float32s:
+    """Return how far targets are apart, in spans, (P, N, N); of UAVs that fly other legs the nearest."""
+    apart = arrays.between.min(axis=1) / span[:, None, None]
+    return np.minimum(apart, _FAR).astype(np.float32)
 
 
 def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
@@ -93,7 +109,7 @@ def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
     m, n, _ = arrays.shape
     span, level, time = scales(arrays)
     length = max(1, min(FOLLOW_UPS, n - 1))
-    between = np.where(arrays.need_total[:, None, :] > 0, arrays.between, np.inf)
+    between = np.where(arrays.areas["need_total"][:, None, :] > 0, arrays.between.min(axis=1), np.inf)
     between[:, np.arange(n), np.arange(n)] = np.inf
     near = np.argsort(between, axis=2, kind="stable")[:, :, :length]
     return VisitGains(
@@ -139,7 +155,7 @@ def _value(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: int,
     for k in range(episodes.load.shape[2]):
         unloaded += min(episodes.load[b, i, k], episodes.need[b, j, k])
     cost = cost_of(arrays, p, leg_to(arrays, episodes, b, i, j))
-    gains.net[b, i, j] = earned_by(arrays, p, j, unloaded) - cost
+    gains.net[b, i, j] = earned_now(arrays, episodes, b, i, j, unloaded) - cost
     gains.unloaded[b, i, j] = unloaded
 
 
@@ -203,11 +219,12 @@ def observe(
         for k in range(episodes.need.shape[2]):
             need += episodes.need[b, j, k]
         unloaded = gains.unloaded[b, i, j]
-        value = earned_by(arrays, p, j, unloaded) if unloaded > 0.0 else 0.0
+        value = earned_now(arrays, episodes, b, i, j, unloaded) if unloaded > 0.0 else 0.0
         cost = cost_of(arrays, p, d)
-        reach = flown_with_return(arrays, p, i, j, episodes.flown[b, i] + d)
-        travel = arrival_after(arrays, p, i, 0.0, d)
-        deadline = arrays.deadline[p, j]
+        travel = leg_time(arrays, p, i, episodes.at[b, i], j, d)
+        air = air_length(arrays, p, i, d, travel)
+        reach = flown_with_return(arrays, p, i, j, episodes.flown[b, i] + air)
+        deadline = arrays.areas[p, j].deadline
 
         best, second, rival, able, supply = FORBIDDEN, FORBIDDEN, -1, 0, 0.0
         for other in range(m):
@@ -224,7 +241,7 @@ def observe(
             seen[2] = squash((other_net - max(its_elsewhere, 0.0)) / scale)
             seen[3] = gains.unloaded[b, other, j] / need
             seen[4] = 1.0 if other > i else 0.0
-            seen[5] = leg_to(arrays, episodes, b, other, j) / span
+            seen[5] = min(leg_to(arrays, episodes, b, other, j) / span, _FAR)
             supply += gains.unloaded[b, other, j]
             if other_net > best:
                 best, second, rival = other_net, best, other
@@ -240,22 +257,22 @@ def observe(
 
         row = pair[j]
         row[0] = 1.0 if allowed else 0.0
-        row[1] = d / span
+        row[1] = min(d / span, _FAR)
         row[2] = squash(cost / scale)
         row[3] = value / scale
         row[4] = squash(net / scale) if allowed else -1.0
         row[5] = unloaded / need if need > 0.0 else 0.0
         row[6] = unloaded / load if load > 0.0 else 0.0
-        row[7] = need / arrays.need_total[p, j] if arrays.need_total[p, j] > 0.0 else 0.0
-        row[8] = min(arrays.level[p, j] / scale, LARGEST_LEVEL)
-        row[9] = clip((arrays.voyage[p, i] - reach) / span, -1.0, 3.0)
+        row[7] = need / arrays.areas[p, j].need_total if arrays.areas[p, j].need_total > 0.0 else 0.0
+        row[8] = min(arrays.areas[p, j].level / scale, LARGEST_LEVEL)
+        row[9] = clip((arrays.uavs[p, i].voyage - reach) / span, -1.0, 3.0)
         row[10] = home_then / span
-        row[11] = (d + home_then - home_now) / span
+        row[11] = min((d + home_then - home_now) / span, _FAR)
         row[12] = 1.0 if deadline < np.inf else 0.0
         row[13] = (
             clip((deadline - episodes.clock[b, i] - travel) / time, -2.0, 4.0) if deadline < np.inf else 0.0
         )
-        row[14] = clip(arrays.service[p, j] / time, 0.0, 4.0)
+        row[14] = clip(arrays.areas[p, j].service / time, 0.0, 4.0)
         row[15] = clip(travel / time, 0.0, 4.0)
         row[16] = squash(best / scale) if able > 0 else -1.0
         row[17] = squash(second / scale) if able > 1 else -1.0
@@ -312,23 +329,23 @@ def _observe_self(
         needed += need_k
         covered += min(need_k, supply_k)
     home_now = leg_home(arrays, episodes, b, i)
-    left = arrays.voyage[p, i] - episodes.flown[b, i]
+    left = arrays.uavs[p, i].voyage - episodes.flown[b, i]
     own[3] = load / most if most > 0.0 else 0.0
     own[4] = load / start_load if start_load > 0.0 else 0.0
     own[5] = clip(left / span, 0.0, 4.0)
     own[6] = home_now / span
-    own[7] = squash(arrays.weight[p] * home_now / scale) if arrays.charge_return[p] else 0.0
-    own[8] = 1.0 if arrays.charge_return[p] else 0.0
-    own[9] = 1.0 if arrays.return_to_base[p] else 0.0
+    own[7] = squash(arrays.terms[p].weight * home_now / scale) if arrays.terms[p].charge_return else 0.0
+    own[8] = 1.0 if arrays.terms[p].charge_return else 0.0
+    own[9] = 1.0 if arrays.terms[p].return_to_base else 0.0
     own[10] = steps_left / steps
     own[11] = 1.0 / steps_left
     own[12] = 1.0 if steps_left == 1 else 0.0
     own[13] = clip(episodes.clock[b, i] / time, 0.0, 4.0)
-    own[14] = clip(arrays.speed[p, i] * time / span, 0.0, 4.0)
+    own[14] = clip(arrays.uavs[p, i].speed * time / span, 0.0, 4.0)
     own[15] = m / (m + n)
     own[16] = covered / needed if needed > 0.0 else 0.0
     own[17] = covered / swarm if swarm > 0.0 else 0.0
-    own[18] = squash(arrays.weight[p] * span / scale)
+    own[18] = squash(arrays.terms[p].weight * span / scale)
     own[19] = out / m
     own[20] = (i + 0.5) / m
     own[21] = 1.0 / n
@@ -353,14 +370,18 @@ def _follow_up(arrays: ProblemArrays, episodes: Episodes, gains: VisitGains, b: 
     """Reward of the best visit after one to target `j`, 0 or more, by what is needed now."""
     p = episodes.problem[b]
     d = leg_to(arrays, episodes, b, i, j)
-    flown = episodes.flown[b, i] + d
-    clock = departure_after(arrays, p, j, arrival_after(arrays, p, i, episodes.clock[b, i], d))
+    time = leg_time(arrays, p, i, episodes.at[b, i], j, d)
+    flown = episodes.flown[b, i] + air_length(arrays, p, i, d, time)
+    clock = departure_after(arrays, p, j, episodes.clock[b, i] + time)
     best = 0.0
     for q in range(gains.near.shape[2]):
         then = gains.near[p, j, q]
         way = leg(arrays, p, i, j, then)
-        arrival = arrival_after(arrays, p, i, clock, way)
-        if is_out_of_range(arrays, p, i, then, flown + way) or is_late(arrival, arrays.deadline[p, then]):
+        time = leg_time(arrays, p, i, j, then, way)
+        air = air_length(arrays, p, i, way, time)
+        if is_out_of_range(arrays, p, i, then, flown + air) or is_late(
+            clock + time, arrays.areas[p, then].deadline
+        ):
             continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):

@@ -14,6 +14,7 @@ from app.learning.universal.episodes.observation import (
     VisitGains,
     look,
     look_again,
+    nearness,
     new_gains,
     observe,
 )
@@ -23,7 +24,7 @@ from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATU
 from app.learning.universal.network.inference import ask_together, attention_bias, compile_agent
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, end_step, new_episodes
+from app.simulation.simulator import Episodes, act, close, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
@@ -88,7 +89,7 @@ def play(
     plans = np.full((batch, steps, m), n, np.int64)
     rewards = np.zeros(batch)
     compiled, sharpness = compile_agent(agent), float(agent.sharpness.detach().exp())
-    bias = attention_bias(agent, (arrays.between / gains.span[:, None, None]).astype(np.float32))
+    bias = attention_bias(agent, nearness(arrays, gains.span))
     hidden = np.zeros((m, batch, len(compiled.home)), np.float32)
     pair = np.empty((batch, n, PAIR_FEATURES), np.float32)
     own = np.empty((batch, OWN_FEATURES), np.float32)
@@ -234,5 +235,5 @@ def _end_steps(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> No
 @njit(cache=True, nogil=True, error_model="numpy")
 def _send_home(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> None:
     for b in range(episodes.done.shape[0]):
-        for i in range(episodes.ret.shape[1]):
-            rewards[b] += act(arrays, episodes, b, i, arrays.level.shape[1])
+        if not episodes.done[b]:
+            rewards[b] += close(arrays, episodes, b)

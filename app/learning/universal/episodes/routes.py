@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, reset_one, verdict
-from app.simulation.visit import ALLOWED, START
+from app.simulation.simulator import Episodes, act, close, reset_one, verdict
+from app.simulation.visit import ALLOWED, START, airborne, ready
 
 NOBODY = -1
 
@@ -35,7 +35,7 @@ def fly_routes(
         UAV that has not moved in the end, or ``NOBODY``; its column of the plan is left as it is.
     """
     m, steps = routes.shape
-    home = arrays.level.shape[1]
+    home = arrays.need.shape[1]
     reset_one(arrays, episodes, 0)
     place[:] = 0
     earned = 0.0
@@ -52,6 +52,8 @@ def fly_routes(
             place[i] = p + 1
             plan[s, i] = action
             earned += act(arrays, episodes, 0, i, action)
+    if without == NOBODY:
+        return earned + close(arrays, episodes, 0)
     for i in range(m):
         if i != without:
             earned += act(arrays, episodes, 0, i, home)
@@ -71,7 +73,7 @@ def fly_last(
     loads, needs
         (K,) and (S, K), scratch.
     """
-    home, materials = arrays.level.shape[1], episodes.load.shape[2]
+    home, materials = arrays.need.shape[1], episodes.load.shape[2]
     flown, satisfaction, distance = episodes.flown[0, i], episodes.satisfaction[0], episodes.distance[0]
     for k in range(materials):
         loads[k] = episodes.load[0, i, k]
@@ -91,7 +93,9 @@ def fly_last(
             episodes.need[0, route[s], k] = needs[s, k]
     for k in range(materials):
         episodes.load[0, i, k] = loads[k]
-    episodes.at[0, i], episodes.flown[0, i], episodes.clock[0, i] = START, flown, 0.0
+    episodes.at[0, i], episodes.flown[0, i], episodes.visits[0, i] = START, flown, 0
+    episodes.clock[0, i], episodes.aloft[0, i] = ready(arrays, 0, i), airborne(arrays, 0, i)
+    episodes.kept[0, i, :] = False
     episodes.ret[0, i] = arrays.ret[0, i]
     episodes.satisfaction[0], episodes.distance[0] = satisfaction, distance
     return earned

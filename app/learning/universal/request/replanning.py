@@ -18,8 +18,8 @@ from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, part
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, new_episodes, reset_one, verdict
-from app.simulation.visit import ALLOWED, START, cost_of, earned_by, leg
+from app.simulation.simulator import Episodes, act, earned_now, new_episodes, reset_one, verdict
+from app.simulation.visit import ALLOWED, COMMITTED_ELSEWHERE, START, cost_of, leg
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
@@ -158,7 +158,7 @@ def _gaps(arrays: ProblemArrays, plan: Integers, one: int, flying: Integers, gap
 
     The place where a UAV is stands for a route without visits; two such routes are infinitely far apart.
     """
-    n = arrays.level.shape[1]
+    n = arrays.need.shape[1]
     for q in range(len(flying)):
         other, gap = flying[q], np.inf
         for s in range(plan.shape[0]):
@@ -169,7 +169,7 @@ def _gaps(arrays: ProblemArrays, plan: Integers, one: int, flying: Integers, gap
             for t in range(plan.shape[0]):
                 if plan[t, other] < n:
                     visited = True
-                    gap = min(gap, arrays.between[0, j, plan[t, other]])
+                    gap = min(gap, leg(arrays, 0, other, j, plan[t, other]))
             if not visited:
                 gap = min(gap, arrays.start_target[0, other, j])
         if gap == np.inf:
@@ -188,7 +188,7 @@ def _leave(
     That is minus infinite where none of its UAVs may go, now or later: loads and ranges only shrink. Else it
     is infinite where one went in the plan, and elsewhere the most that one would earn there now.
     """
-    n = arrays.level.shape[1]
+    n = arrays.need.shape[1]
     reset_one(arrays, episodes, g)
     for s in range(plan.shape[0]):
         for i in range(plan.shape[1]):
@@ -198,12 +198,13 @@ def _leave(
     for j in range(n):
         worth[j] = -np.inf
         for i in range(plan.shape[1]):
-            if group[i] and verdict(arrays, episodes, g, i, j) == ALLOWED:
+            # What a UAV is committed to may come first.
+            if group[i] and verdict(arrays, episodes, g, i, j) in (ALLOWED, COMMITTED_ELSEWHERE):
                 unloaded = 0.0
                 for k in range(episodes.load.shape[2]):
                     unloaded += min(episodes.load[g, i, k], episodes.need[g, j, k])
                 cost = cost_of(arrays, 0, leg(arrays, 0, i, START, j))
-                worth[j] = max(worth[j], earned_by(arrays, 0, j, unloaded) - cost)
+                worth[j] = max(worth[j], earned_now(arrays, episodes, g, i, j, unloaded) - cost)
     for i in range(plan.shape[1]):
         if group[i]:
             for s in range(plan.shape[0]):
@@ -225,7 +226,7 @@ def _insert(
 ) -> None:
     """Write the whole plans of groups' episodes (B, S, I), and last the one that has the best of them."""
     steps, m = plan.shape
-    n, home, groups = arrays.level.shape[1], targets.shape[1], len(uavs)
+    n, home, groups = arrays.need.shape[1], targets.shape[1], len(uavs)
     place, flown, routes = np.empty(m, np.int64), plans[-1], np.ascontiguousarray(plan.T)
     known = fly_routes(arrays, episodes, routes, place, flown)
     rewards, best = np.full(groups, -np.inf), np.empty(groups, np.int64)

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from app.learning.parameters import SERVICE_GRAD_NORM_CLIP
-from app.learning.universal.episodes.observation import scales
+from app.learning.universal.episodes.observation import nearness, scales
 from app.learning.universal.episodes.turns import Turns
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.mixer import UniversalMixer
@@ -61,7 +61,7 @@ def make_batch(arrays: ProblemArrays, turns: Turns, device: torch.device) -> Bat
     """Turn unfolded episodes, one of each problem of a stack in order, into tensors."""
     span, level, _ = scales(arrays)
     m = arrays.shape[0]
-    distance = (arrays.between / span[:, None, None]).astype(np.float32)
+    distance = nearness(arrays, span)
     reward = (turns.reward / level[:, None] / m).astype(np.float32)
     columns = {**turns._asdict(), "distance": distance, "reward": reward}
     tensors = {name: torch.from_numpy(column).to(device) for name, column in columns.items()}

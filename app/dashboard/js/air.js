@@ -1,0 +1,50 @@
+/** What is in the air of a problem, on the map: no-fly zones, and the wind. */
+
+import * as L from "../vendor/leaflet/leaflet.js";
+import { h, shown, svg } from "./dom.js";
+import { called } from "./plan.js";
+
+/** Zones and wind on a Leaflet map. */
+export class Air {
+  /** @param {L.Map} map @param {boolean} globe whether speeds are in km/h */
+  constructor(map, globe) {
+    this.map = map;
+    this.unit = globe ? " km/h" : "";
+    map.createPane("zones").style.zIndex = 440;
+    this.renderer = L.svg({ padding: 0.5, pane: "zones" });
+    this.zones = L.layerGroup().addTo(map);
+    this.control = null;
+    this.drawn = null;
+  }
+
+  /** Draw what a problem has. @param {(point: {x, y}) => number[]} latLng where a position is drawn */
+  draw({ no_fly_zones: zones = [], wind = null }, latLng, shift) {
+    const { drawn } = this;
+    if (drawn?.zones !== zones || drawn.shift !== shift) this.#drawZones(zones, latLng);
+    if (drawn?.wind !== wind) this.#drawWind(wind);
+    this.drawn = { zones, wind, shift };
+  }
+
+  #drawZones(zones, latLng) {
+    this.zones.clearLayers();
+    for (const zone of zones) {
+      const corners = zone.polygon.map(([x, y]) => latLng({ x, y }));
+      const drawn = L.polygon(corners, { renderer: this.renderer, className: "no-fly-zone", weight: 1.5, smoothFactor: 0 });
+      drawn.bindTooltip(() => h("span", {}, `${called(zone)}: not to be flown through`), { sticky: true, className: "tip" });
+      this.zones.addLayer(drawn);
+      drawn.getElement().dataset.zoneId = zone.id;
+    }
+  }
+
+  #drawWind(wind) {
+    this.control?.remove();
+    this.control = null;
+    if (!wind) return;
+    const says = `wind ${shown(wind.speed)}${this.unit} towards ${shown(wind.towards)}°`;
+    const arrow = svg("svg", { viewBox: "0 0 24 24", width: 24, height: 24, "aria-hidden": "true" },
+      svg("path", { d: "M12 21V4M6 10l6-7 6 7", transform: `rotate(${wind.towards} 12 12)` }));
+    this.control = L.control({ position: "topright" });
+    this.control.onAdd = () => h("div", { class: "wind" }, arrow, h("span", {}, says));
+    this.control.addTo(this.map);
+  }
+}

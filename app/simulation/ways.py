@@ -1,0 +1,78 @@
+"""The ways of single legs of a problem, worked out for the answer alone: searches need only their lengths."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from app.domain.allocation import Path
+from app.domain.geometry import distance
+from app.domain.problem import Problem
+from app.simulation.visit import START
+from app.travel.around_zones import LegsAroundZones
+
+_LONGER = 1.0 + 1e-12
+"""A way that turns is longer than the straight line by more than the rounding of either."""
+
+
+class Ways:
+    """Ways round the no-fly zones of a problem.
+
+    Zones are looked at when the first way is asked for that is longer than the straight line.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        uavs, targets = problem.uavs, problem.targets
+        # In the order in which the lengths were worked out, so that of two ways of one length it is that one.
+        self._places = [
+            *((uav.x_c, uav.y_c) for uav in uavs),
+            *((uav.x_s, uav.y_s) for uav in uavs),
+            *((target.x, target.y) for target in targets),
+        ]
+
+    def to(self, i: int, at: int, j: int, length: float) -> Path | None:
+        """Return the points that UAV `i` flies over from where it is to target `j`.
+
+        Parameters
+        ----------
+        i, at, j
+            As in :mod:`app.simulation.visit`.
+        length
+            Of the leg, over ground.
+
+        Returns
+        -------
+        tuple
+            None where the way is a straight line, or is not known.
+        """
+        return self._between(i, self._place(i, at), self._target(j), length)
+
+    def home(self, i: int, at: int, length: float) -> Path | None:
+        """Return the same for its way from where it is to its starting point."""
+        return self._between(i, self._place(i, at), self._problem.n_uavs + i, length)
+
+    def _place(self, i: int, at: int) -> int:
+        return i if at == START else self._target(at)
+
+    def _target(self, j: int) -> int:
+        return 2 * self._problem.n_uavs + j
+
+    def _between(self, i: int, origin: int, destination: int, length: float) -> Path | None:
+        problem = self._problem
+        if not problem.no_fly_zones:
+            return None
+        straight = distance(problem.crs, *self._places[origin], *self._places[destination])
+        if length <= straight * _LONGER:
+            return None
+        way = self._legs.way(origin, destination, problem.uavs[i].speed)
+        if way is None or len(way.points) <= 2:
+            return None
+        return tuple((x, y) for x, y in way.points.tolist())
+
+    @cached_property
+    def _legs(self) -> LegsAroundZones:
+        """The legs in still air: wind does not change a way, and those that it forbids are in no plan."""
+        zones = [np.array(zone.polygon, np.float64) for zone in self._problem.no_fly_zones]
+        return LegsAroundZones(self._problem.crs, np.array(self._places, np.float64), zones)

@@ -1,0 +1,99 @@
+"""Every algorithm on random small problems of every mixture of fields, against the independent referee."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from referee import Illegal, replay
+from worlds import random_world
+
+from app.domain.plan import Plan
+from app.domain.problem import Problem
+from app.domain.records import problem_to_record
+from app.simulation.evaluation import reward_of
+from app.solvers.bound.upper_bound import upper_bound
+from app.solvers.exact import Exact
+from app.solvers.genetic import GeneticAlgorithm
+from app.solvers.greedy import greedy_plan
+from app.solvers.local_search.solver import LocalSearch
+from app.solvers.parameters import ExactParameters, GeneticParameters, LocalSearchParameters
+from app.solvers.protocol import SolverContext
+from app.solvers.stop import Deadline
+
+REL = 1e-9
+PROBLEMS = 60
+MOST_PLANS = 400
+
+
+def best_plan(body: dict[str, Any]) -> float | None:
+    """The best reward of all plans by the referee; None where they are too many."""
+    m, n = len(body["uavs"]), len(body["targets"])
+    orders = (itertools.permutations(range(n), k) for k in range(1, body["max_steps"] + 1))
+    routes = [(), *itertools.chain(*orders)]
+
+    def rows(chosen):
+        longest = max(1, *map(len, chosen))
+        return [[route[s] if s < len(route) else n for route in chosen] for s in range(longest)]
+
+    possible = []
+    for i in range(m):
+        own = []
+        for route in routes:
+            try:
+                replay(body, rows([route if h == i else () for h in range(m)]))
+            except Illegal as broken:
+                if broken.args[2] != "useless":
+                    continue
+            own.append(route)
+        possible.append(own)
+    count = 1
+    for own in possible:
+        count *= len(own)
+    if count > MOST_PLANS:
+        return None
+    best = -float("inf")
+    for chosen in itertools.product(*possible):
+        try:
+            best = max(best, replay(body, rows(chosen))["reward"])
+        except Illegal:
+            continue
+    return best
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_plans_are_legal_rewards_true_and_bounds_valid(part):
+    context = SolverContext()
+    solvers = {
+        "ga": GeneticAlgorithm(GeneticParameters(num_total=20, iteration=10), context),
+        "local_search": LocalSearch(LocalSearchParameters(moves=3000), context),
+        "exact": Exact(ExactParameters(), context),
+    }
+    proven = 0
+    for number in range(part * PROBLEMS, (part + 1) * PROBLEMS):
+        rng = np.random.default_rng(number)
+        problem = random_world(rng, max_uavs=3, max_targets=3)
+        body = problem_to_record(problem)
+        rewards = {"greedy": earned(body, problem, greedy_plan(problem))}
+        for name, solver in solvers.items():
+            solution = solver.solve(problem, 1, Deadline(2.0), lambda _: None)
+            rewards[name] = earned(body, problem, solution.plan)
+        best, most = best_plan(body), max(rewards.values())
+        slack = 1e-7 * max(1.0, abs(most))
+        assert solution.proof.bound >= most - slack, number
+        for known in (None, rewards["local_search"]):
+            assert upper_bound(problem, known, Deadline(0.5)).value >= most - slack, number
+        if best is not None:
+            assert solution.proof.bound >= best - slack, number
+            assert rewards["exact"] >= best - slack or not solution.proof.proven, number
+            proven += solution.proof.proven
+    assert proven > 0.9 * PROBLEMS
+
+
+def earned(body: dict[str, Any], problem: Problem, plan: Plan) -> float:
+    """The reward of a plan, which the referee confirms."""
+    reward = reward_of(problem, plan)
+    assert reward == pytest.approx(replay(body, plan.assignment)["reward"], rel=REL, abs=REL)
+    return reward

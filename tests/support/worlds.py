@@ -1,0 +1,138 @@
+"""Random problems that use what there is in the world beyond places, loads and deadlines."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from problems import random_problem
+
+from app.domain.geometry import distance
+from app.domain.matrices import Matrix
+from app.domain.problem import NoFlyZone, Problem, Wind
+
+
+def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
+    """A random problem with each of the fields of the world now and then, in sizes that matter."""
+    problem = random_problem(rng, max_uavs, max_targets)
+    across = problem.extent / float(np.median([uav.speed for uav in problem.uavs]))
+    problem = _timed(problem, rng, across)
+    problem = _promised(problem, rng)
+    if rng.random() < 0.3:
+        return _in_matrices(problem, rng, across)
+    if rng.random() < 0.5:
+        slowest = min(uav.speed for uav in problem.uavs)
+        wind = Wind(slowest * float(rng.uniform(0.0, 1.2)), float(rng.uniform(-360, 360)))
+        problem = replace(problem, wind=wind)
+    if rng.random() < 0.6:
+        problem = replace(problem, no_fly_zones=_zones(problem, rng))
+    return problem
+
+
+def _timed(problem: Problem, rng: np.random.Generator, across: float) -> Problem:
+    def maybe(value: object, otherwise: object, share: float = 0.35) -> object:
+        return value if rng.random() < share else otherwise
+
+    uavs = tuple(
+        replace(
+            uav,
+            endurance=maybe(across * float(rng.uniform(0.5, 4)), None),
+            airborne=maybe(across * float(rng.uniform(0, 0.3)), 0.0, 0.2),
+            reserve=maybe(float(rng.uniform(0, 0.4)), 0.0),
+            available_from=maybe(across * float(rng.uniform(0, 1)), 0.0),
+            available_until=maybe(across * float(rng.uniform(0.5, 5)), None),
+        )
+        for uav in problem.uavs
+    )
+    targets = tuple(
+        replace(
+            target,
+            earliest=maybe(across * float(rng.uniform(0, 2)), 0.0),
+            requested=maybe(tuple(1.5 * amount for amount in target.loadlist), None, 0.2),
+        )
+        for target in problem.targets
+    )
+    objective = replace(
+        problem.objective,
+        half_life=maybe(across * float(rng.uniform(0.3, 3)), None),
+        minimum_share=maybe(float(rng.uniform(0, 1)), 0.0, 0.5),
+        minimum_weight=maybe(float(rng.uniform(1, 4)), 1.0, 0.5),
+        makespan_weight=maybe(float(rng.uniform(0, 1)) / across, 0.0),
+    )
+    return replace(problem, uavs=uavs, targets=targets, objective=objective)
+
+
+def _promised(problem: Problem, rng: np.random.Generator) -> Problem:
+    """Add skills, exclusions, promises, and a plan to begin from."""
+    ids = [target.id for target in problem.targets]
+    words = ("medic", "winch")
+    uavs = []
+    for uav in problem.uavs:
+        mixed = list(rng.permutation(ids))
+        cut = int(rng.integers(0, 2)) if rng.random() < 0.3 else 0
+        promised = int(rng.integers(1, 3)) if rng.random() < 0.3 else 0
+        skills = tuple(word for word in words if rng.random() < 0.7)
+        committed = tuple(map(str, mixed[cut : cut + promised]))
+        uavs.append(replace(uav, skills=skills, excluded=tuple(map(str, mixed[:cut])), committed=committed))
+    targets = tuple(
+        replace(target, skills=tuple(word for word in words if rng.random() < 0.15))
+        for target in problem.targets
+    )
+    problem = replace(problem, uavs=tuple(uavs), targets=targets)
+    if rng.random() < 0.4:
+        steps = int(rng.integers(1, problem.max_steps + 1))
+        rows = rng.integers(0, problem.n_targets + 1, (steps, problem.n_uavs)).tolist()
+        weight = float(rng.choice([0.0, 0.2]))
+        problem = replace(
+            problem,
+            start_plan=tuple(map(tuple, rows)),
+            objective=replace(problem.objective, change_weight=weight),
+        )
+    return problem
+
+
+def _in_matrices(problem: Problem, rng: np.random.Generator, across: float) -> Problem:
+    """The same problem with legs from matrices: lengths bent a little, some missing."""
+    places = [(uav.x_c, uav.y_c) for uav in problem.uavs] + [(uav.x_s, uav.y_s) for uav in problem.uavs]
+    places += [(target.x, target.y) for target in problem.targets]
+    m, r = problem.n_uavs, len(places)
+    straight = np.array([[distance(problem.crs, *a, *b) for b in places] for a in places])
+
+    def table(scale: float) -> np.ndarray:
+        bent = straight * scale * rng.uniform(0.7, 1.4, (r, r))
+        bent[rng.random((r, r)) < 0.05] = math.inf
+        np.fill_diagonal(bent, 0.0)
+        return bent
+
+    names = ("road", "air")[: int(rng.integers(1, 3))]
+    matrices = {
+        name: Matrix(table(1.0), table(across / problem.extent) if rng.random() < 0.5 else None)
+        for name in names
+    }
+    uavs = tuple(
+        replace(
+            uav,
+            location=i,
+            home_location=None if (uav.x_c, uav.y_c) == (uav.x_s, uav.y_s) else m + i,
+            profile=str(rng.choice(names)) if len(names) > 1 or rng.random() < 0.5 else None,
+        )
+        for i, uav in enumerate(problem.uavs)
+    )
+    targets = tuple(replace(target, location=2 * m + j) for j, target in enumerate(problem.targets))
+    return replace(problem, uavs=uavs, targets=targets, matrices=matrices)
+
+
+def _zones(problem: Problem, rng: np.random.Generator) -> tuple[NoFlyZone, ...]:
+    """One to three zones of three to five corners, which may overlap."""
+    xs = [uav.x_s for uav in problem.uavs] + [target.x for target in problem.targets]
+    ys = [uav.y_s for uav in problem.uavs] + [target.y for target in problem.targets]
+    across = problem.extent if problem.crs == "local" else math.hypot(max(xs) - min(xs), max(ys) - min(ys))
+    zones = []
+    for number in range(int(rng.integers(1, 4))):
+        x, y = rng.uniform(min(xs), max(xs) + 1e-9), rng.uniform(min(ys), max(ys) + 1e-9)
+        size, corners = across * rng.uniform(0.05, 0.25), int(rng.integers(3, 6))
+        angles = (np.arange(corners) + rng.uniform(0, 0.8, corners)) / corners * 2 * math.pi
+        polygon = tuple(
+            (float(x + size * math.cos(angle)), float(y + size * math.sin(angle))) for angle in angles
+        )
+        zones.append(NoFlyZone(f"zone-{number + 1}", polygon))
+    return tuple(zones)
