@@ -35,14 +35,14 @@ def test_a_plan_is_worth_what_its_allocation_says(client):
 
 
 def test_every_action_that_breaks_a_rule_is_named_with_its_figures(client):
-    short = {**PROBLEM, "uavs": [{**UAVS[0], "voyage": 1.0}, UAVS[1]]}
+    short = {**PROBLEM, "uavs": [{**UAVS[0], "voyage": 1.2}, UAVS[1]]}
     answer = client.post("/evaluate", json={**short, "assignment": [[0, 0], [7, 3], [1, 1]]})
     assert answer.status_code == 422
     problem = answer.json()
     assert problem["type"] == "illegal-plan"
     assert [each["rule"] for each in problem["breaches"]] == ["range", "no_such_action", "returning"]
     first = problem["breaches"][0]
-    assert (first["step"], first["uav_id"], first["target_id"], first["had"]) == (1, "uav-1", "area-1", 1.0)
+    assert (first["step"], first["uav_id"], first["target_id"], first["had"]) == (1, "uav-1", "area-1", 1.2)
     assert first["needed"] == pytest.approx(2 * (0.2**2 + 0.7**2) ** 0.5)
     assert [each["pointer"] for each in problem["errors"]] == [
         "/assignment/0/0",
