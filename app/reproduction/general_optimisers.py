@@ -1,8 +1,10 @@
 """General optimisers of vehicle routes, given our problems as well as their models allow; to compare with.
 
-Both are told of every UAV's position, range, speed, loads and step limit, of service times and deadlines, and
-maximise prizes less distance. A client of theirs is served in one visit and in full, or not at all, so each
-gets two models, half of the time for either, and the better plan counts (one, where they are the same):
+Both are told of every UAV's position, range, speed, loads and step limit, of service times, of when areas
+open and close and UAVs are ready, of zones and matrices as distances, of skills and exclusions as legs that
+are not there, and maximise prizes less distance. A client of theirs is served in one visit and in full, or
+not at all, so each gets two models, half of the time for either, and the better plan counts (one, where they
+are the same):
 
 - an area is a client, for the whole reward, and is served by one UAV;
 - each material of an area is a client of its own, for its part of the reward, at the same place. So UAVs
@@ -16,7 +18,10 @@ They cannot express
 - in PyVRP, that several clients are served in one visit: where materials are clients, the limit of steps is
   as many times as large as there are materials;
 - in PyVRP, where distance is charged but not the leg home, a cost of distance: the cost is that of time at
-  the UAV's speed, so service times are charged too, and given back through the prizes at the mean speed.
+  the UAV's speed, so service times are charged too, and given back through the prizes at the mean speed, and
+  so is waiting;
+- endurance, ``available_until``, commitments, wind's air lengths, what decays, first shares, makespan and
+  changes: plans are flown by our rules, and visits that these forbid are left out.
 
 They are extras: ``pip install -e ".[compare]"``.
 """
@@ -35,6 +40,7 @@ from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
 from app.simulation.arrays import Floats, ProblemArrays, alike, compile_problem
 from app.simulation.evaluation import reward_of
+from app.simulation.legs import UNREACHABLE
 from app.simulation.simulator import act, end_step, new_episodes, verdict
 from app.simulation.visit import ALLOWED
 
@@ -73,8 +79,10 @@ class _Model(NamedTuple):
         where they do not count.
     longest
         (M,) what may be flown.
-    latest
-        (N,) time at which service may end.
+    earliest, latest
+        (N,) times at which service may end.
+    ready
+        (M,) when a UAV sets out.
     prize, share
         (C,) reward, and share of the target's need.
     load, need
@@ -89,7 +97,9 @@ class _Model(NamedTuple):
     duration: dict[int, Floats]
     charged: dict[int, Floats]
     longest: Floats
+    earliest: Floats
     latest: Floats
+    ready: Floats
     prize: Floats
     share: Floats
     load: Floats
@@ -109,17 +119,27 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
     np.fill_diagonal(service, 0.0)
     for i in set(like):
         legs = np.zeros((n + 2 * m, n + 2 * m))
-        legs[:n, :n] = arrays.between[0]
+        uav = arrays.uavs[0, i]
+        legs[:n, :n] = arrays.between[0, uav["leg_class"]]
         legs[n + i, :n] = arrays.start_target[0, i]
+        times = legs / uav["speed"]
+        if arrays.terms["timed"][0]:
+            times[:n, :n] = arrays.between_time[0, uav["leg_class"]]
+            times[n + i, :n] = arrays.start_time[0, i]
+        barred = arrays.kept_range[0, i] >= UNREACHABLE
+        for matrix in (legs, times):
+            matrix[:, :n][:, barred] = UNREACHABLE
+            np.fill_diagonal(matrix, 0.0)
         home = legs.copy()
         home[:n, n + m + i] = arrays.home[0, i]
-        distance[i] = np.ceil(per_distance * (home if problem.objective.return_to_base else legs))
-        duration[i] = np.ceil(per_time * (legs / arrays.uavs["speed"][0, i] + service))
-        charged[i] = home if problem.objective.charge_return else legs
+        distance[i] = _whole(per_distance * (home if problem.objective.return_to_base else legs))
+        duration[i] = _whole(per_time * (times + service))
+        paid = home if problem.objective.charge_return else legs
+        charged[i] = np.minimum(paid, _UNLIMITED / per_distance)
     latest = np.where(
         np.isfinite(arrays.areas["deadline"][0]), arrays.areas["deadline"][0] * per_time, _UNLIMITED
     )
-    total = arrays.areas["need_total"][0]
+    total, opens = arrays.areas["need_total"][0], arrays.areas["earliest"][0]
     worth = [j for j in range(n) if total[j] > 0 and arrays.areas["level"][0, j] > 0 and latest[j] >= 0]
     need = np.ceil(amounts * arrays.need[0] - 1e-9)
     clients, needs = worth, need[worth]
@@ -135,13 +155,20 @@ def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Mo
         duration=duration,
         charged=charged,
         longest=np.maximum(0, np.floor(per_distance * (arrays.uavs["voyage"][0] - arrays.uavs["dis"][0]))),
+        earliest=_whole(per_time * np.where(opens > 0, opens + arrays.areas["service"][0], 0.0)),
         latest=np.floor(latest + np.ceil(per_time * arrays.areas["service"][0])),
+        ready=_whole(per_time * arrays.uavs["ready"][0]),
         prize=arrays.areas["level"][0][clients] * share,
         share=share,
         load=np.floor(amounts * arrays.load[0] + 1e-9),
         need=needs,
         most_clients=max((clients.count(j) for j in worth), default=1),
     )
+
+
+def _whole(units: Floats) -> Floats:
+    """Return whole units, rounded up; what is longer than anything may be is that long."""
+    return np.minimum(np.ceil(units), _UNLIMITED)
 
 
 def _better_plan(
@@ -220,6 +247,7 @@ def _pyvrp_routes(
         pyvrp.Client(
             location=j,
             delivery=[*(int(amount) for amount in need), _VISIT],
+            tw_early=int(min(model.earliest[j], model.latest[j])),
             tw_late=int(model.latest[j]),
             prize=round(scale * (prize + back)),
             required=False,
@@ -236,7 +264,9 @@ def _pyvrp_routes(
             start_depot=i,
             end_depot=m + i,
             max_distance=int(model.longest[i]),
-            start_late=0,
+            tw_early=int(model.ready[i]),
+            # Who need not be anywhere early takes off later, rather than waits on the way.
+            start_late=int(model.ready[i]) if not model.earliest.any() else _UNLIMITED,
             unit_distance_cost=0,
             # Where distance costs nothing it still breaks ties.
             unit_duration_cost=max(1, round(scale * unit[i])),
@@ -312,8 +342,13 @@ def _routing_routes(
     model_.AddDimensionWithVehicleTransitAndCapacity(
         [of_uav("distance", i) for i in out], 0, longest, True, "distance"
     )
-    model_.AddDimensionWithVehicleTransits([of_uav("time", i) for i in out], 0, _UNLIMITED, True, "time")
+    slack = _UNLIMITED if model.earliest.any() else 0
+    model_.AddDimensionWithVehicleTransits(
+        [of_uav("time", i) for i in out], slack, _UNLIMITED, not model.ready.any(), "time"
+    )
     times = model_.GetDimensionOrDie("time")
+    for q, i in enumerate(out):
+        times.CumulVar(model_.Start(q)).SetMin(int(model.ready[i]))
     visits = registered(np.not_equal.outer(nodes, nodes) * (np.array(nodes) < n))
     model_.AddDimension(visits, 0, problem.max_steps, True, "visits")
     for each in range(k):
@@ -324,7 +359,7 @@ def _routing_routes(
     for c, j in enumerate(model.clients):
         node = manager.NodeToIndex(c)
         model_.AddDisjunction([node], round(scale * model.prize[c]))
-        times.CumulVar(node).SetMax(int(model.latest[j]))
+        times.CumulVar(node).SetRange(int(min(model.earliest[j], model.latest[j])), int(model.latest[j]))
     options = pywrapcp.DefaultRoutingSearchParameters()
     options.first_solution_strategy = routing_enums_pb2.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
     options.local_search_metaheuristic = routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH

@@ -24,7 +24,8 @@ from app.domain.problem import Problem  # noqa: E402
 from app.domain.records import problem_to_record  # noqa: E402
 from app.reproduction.errors import MissingPackage  # noqa: E402
 from app.reproduction.general_optimisers import pyvrp_plan, require, routing_plan  # noqa: E402
-from app.simulation.generator import FAMILIES, generate  # noqa: E402
+from app.simulation.generator import FAMILIES  # noqa: E402
+from app.simulation.world_generator import WORLD_FAMILIES  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
 from app.solvers.stop import Deadline  # noqa: E402
@@ -36,6 +37,7 @@ def auto_plan(problem: Problem, seconds: float, seed: int) -> Plan:
     return solver.solve(problem, seed, Deadline(seconds), lambda _progress: None).plan
 
 
+EVERY = {**FAMILIES, **WORLD_FAMILIES}
 OPTIMISERS = {"auto": auto_plan, "PyVRP": pyvrp_plan, "OR-Tools": routing_plan}
 
 
@@ -45,23 +47,24 @@ def main() -> None:
     options.add_argument("--seconds", type=float, default=1.0)
     options.add_argument("--sizes", nargs="+", default=["5x10", "10x20", "20x30"])
     options.add_argument("--problems", type=int, default=2)
+    options.add_argument("--families", nargs="+", default=list(EVERY))
     given = options.parse_args()
     try:
         require("pyvrp")
         require("ortools")
     except MissingPackage as missing:
         sys.exit(str(missing))
-    auto_plan(generate("uniform", 3, 4, 3, np.random.default_rng(0)), 0.1, 0)
+    auto_plan(EVERY["uniform"](3, 4, 3, np.random.default_rng(0)), 0.1, 0)
     print(f"{given.seconds} s each; sizes {' '.join(given.sizes)}; {given.problems} problems each")
     print(f"{'family':<14}" + "".join(f"{name:>10}" for name in OPTIMISERS) + f"{'illegal':>10}")
     every: dict[str, list[float]] = defaultdict(list)
-    for family in FAMILIES:
+    for family in given.families:
         ratios: dict[str, list[float]] = defaultdict(list)
         illegal = 0
         for size in given.sizes:
             m, n = map(int, size.split("x"))
             for number in range(given.problems):
-                problem = generate(family, m, n, 3, np.random.default_rng([17, m, n, number]))
+                problem = EVERY[family](m, n, 3, np.random.default_rng([17, m, n, number]))
                 record, rewards = problem_to_record(problem), {}
                 for name, optimise in OPTIMISERS.items():
                     try:

@@ -1,0 +1,28 @@
+"""Generated problems of the second edition: each has what its family is for, and can be flown."""
+
+import numpy as np
+import pytest
+
+from app.domain.world_use import uses_world
+from app.simulation.evaluation import reward_of
+from app.simulation.world_generator import WORLD_FAMILIES
+from app.solvers.greedy import greedy_plan
+
+HAS = {
+    "windows": lambda p: any(t.earliest for t in p.targets) and all(u.endurance for u in p.uavs),
+    "zones": lambda p: len(p.no_fly_zones) == 4,
+    "windy": lambda p: p.wind.speed < min(u.speed for u in p.uavs),
+    "promised": lambda p: any(t.skills for t in p.targets) and any(u.excluded for u in p.uavs),
+    "fair": lambda p: p.objective.half_life and p.objective.minimum_share,
+}
+
+
+@pytest.mark.parametrize("family", WORLD_FAMILIES)
+def test_problems_have_what_their_family_is_for(family):
+    for number in range(5):
+        problem = WORLD_FAMILIES[family](8, 16, 2, np.random.default_rng(number))
+        assert uses_world(problem)
+        assert HAS[family](problem)
+        assert reward_of(problem, greedy_plan(problem)) > 0
+    again = WORLD_FAMILIES[family](8, 16, 2, np.random.default_rng(number))
+    assert again == problem
