@@ -17,6 +17,7 @@ import numpy.typing as npt
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from app.domain.problem import ROUNDING, Problem
+from app.simulation.columns import AREAS, TERMS, UAVS
 from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
 
 Floats = npt.NDArray[np.float64]
@@ -44,106 +45,6 @@ class Axes:
     padding: Any = 0.0
 
 
-TERMS = np.dtype(
-    [
-        ("weight", "f8"),
-        ("decay", "f8"),
-        ("bonus", "f8"),
-        ("makespan", "f8"),
-        ("change", "f8"),
-        ("crumb", "f8"),
-        ("return_to_base", "?"),
-        ("charge_return", "?"),
-        ("timed", "?"),
-        ("in_wind", "?"),
-        ("metric", "?"),
-    ],
-    align=True,
-)
-"""What holds for a whole problem.
-
-weight, makespan, change
-    Distance weight λ as it is used, and the weights of makespan and changes.
-decay
-    1 / half_life, 0 where nothing decays.
-bonus
-    What the first share of a need earns above the rest, minimum_weight - 1; 0 where there is none.
-crumb
-    Amount below which what is left of another one may be rounding: that share of the largest.
-return_to_base, charge_return
-    The objective's switches.
-timed
-    Whether times of legs are given; otherwise they are lengths over speeds.
-in_wind
-    Whether the air length of a leg is time · speed, not the length over ground.
-metric
-    Whether no way over a third place is shorter, or takes less time, than the leg itself.
-"""
-
-UAVS = np.dtype(
-    [
-        ("speed", "f8"),
-        ("voyage", "f8"),
-        ("dis", "f8"),
-        ("ready", "f8"),
-        ("until", "f8"),
-        ("airborne", "f8"),
-        ("endurance", "f8"),
-        ("start_home", "f8"),
-        ("start_home_time", "f8"),
-        ("leg_class", "i8"),
-        ("watched", "?"),
-        ("on_ground", "?"),
-    ],
-    align=True,
-)
-"""What a UAV has.
-
-speed, dis
-    As in the request.
-voyage, endurance
-    Range, and time that it may be in the air, without what has to be left after landing; the latter is
-    infinite where there is no limit.
-ready, until
-    Its clock at the start, and the latest time to have landed; infinite where there is none.
-airborne
-    Time in the air at the start.
-start_home, start_home_time
-    Length of the leg from its current position to its starting point, 0 where there is none, and its time
-    where times are given.
-leg_class
-    Class of its legs.
-watched
-    Whether ``until`` or ``endurance`` is a limit.
-on_ground
-    Whether it waits for its first visit on the ground.
-"""
-
-AREAS = np.dtype(
-    [
-        ("level", "f8"),
-        ("unit", "f8"),
-        ("need_total", "f8"),
-        ("earliest", "f8"),
-        ("deadline", "f8"),
-        ("service", "f8"),
-    ],
-    align=True,
-)
-"""What holds for a target.
-
-level
-    What meeting the whole need at once earns: the emergency level, times the share of what was requested
-    that is still needed, and what the first share earns above.
-unit
-    What a unit of material beyond the first share earns.
-need_total
-    Sum of the needs over materials; 0 for a target that needs nothing.
-earliest, deadline, service
-    As in the request; the deadline is infinite where there is none.
-"""
-
-
 class ProblemArrays(NamedTuple):
     """A stack of P problems of one (padded) shape M, N, K.
 
@@ -164,7 +65,7 @@ class ProblemArrays(NamedTuple):
         (P, M, N) air length that has to be left on arrival at a target: that of the way home, where it is
         required; ``UNREACHABLE`` where the UAV must not be sent there.
     uavs
-        (P, M) of :data:`UAVS`.
+        (P, M) of :data:`~app.simulation.columns.UAVS`.
     committed, before
         (P, M, V) targets that a UAV visits first, in this order, and (P, M, W) those that it visits in
         ``start_plan``, each once, where changes cost reward; ``NONE`` after the last.
@@ -173,7 +74,7 @@ class ProblemArrays(NamedTuple):
     load
         (P, M, K) amounts carried.
     areas
-        (P, N) of :data:`AREAS`.
+        (P, N) of :data:`~app.simulation.columns.AREAS`.
     need
         (P, N, K) amounts needed.
     requested
@@ -181,7 +82,7 @@ class ProblemArrays(NamedTuple):
     beyond
         (P, N, K) amounts of the needs beyond the first share: a need above it is partly of the first share.
     terms
-        (P,) of :data:`TERMS`.
+        (P,) of :data:`~app.simulation.columns.TERMS`.
     max_steps
         (P,) S.
     """

@@ -7,12 +7,12 @@ import numpy as np
 from app.domain.errors import IllegalPlan
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation import simulator, visit
+from app.simulation import replay, visit
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.deliveries import best_deliveries
 
 
-def rewards_of(arrays: ProblemArrays, plans: Actions) -> simulator.Replay:
+def rewards_of(arrays: ProblemArrays, plans: Actions) -> replay.Replay:
     """Replay plans of the first problem of a stack, with greedy unloading.
 
     Parameters
@@ -22,7 +22,7 @@ def rewards_of(arrays: ProblemArrays, plans: Actions) -> simulator.Replay:
     plans
         (B, S, M) actions.
     """
-    return simulator.replay(arrays, plans, np.zeros(len(plans), np.int64))
+    return replay.replay(arrays, plans, np.zeros(len(plans), np.int64))
 
 
 def reward_of(problem: Problem, plan: Plan) -> float:
@@ -40,7 +40,7 @@ def reward_of(problem: Problem, plan: Plan) -> float:
 
 def replayed(
     problem: Problem, arrays: ProblemArrays, actions: Actions
-) -> tuple[simulator.Replay, Floats | None]:
+) -> tuple[replay.Replay, Floats | None]:
     """Replay a plan by the problem's rule of unloading; also return the deliveries if they are planned.
 
     Raises
@@ -54,12 +54,12 @@ def replayed(
         # Rows and actions are looked at here already, as the deliveries are worked out before the replay.
         sound = len(actions) <= problem.max_steps and 0 <= actions.min() <= actions.max() <= problem.n_targets
         delivered = best_deliveries(arrays, actions) if sound else np.zeros((*actions.shape, arrays.shape[2]))
-        result = simulator.replay_delivering(arrays, actions, delivered)
+        result = replay.replay_delivering(arrays, actions, delivered)
     _refuse_illegal(problem, actions, result)
     return result, delivered
 
 
-def _refuse_illegal(problem: Problem, actions: Actions, result: simulator.Replay) -> None:
+def _refuse_illegal(problem: Problem, actions: Actions, result: replay.Replay) -> None:
     rule = int(result.rule[0])
     if rule == visit.ALLOWED:
         return

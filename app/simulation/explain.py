@@ -24,6 +24,7 @@ from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.evaluation import replayed
+from app.simulation.replay import Replay, deliver
 from app.simulation.unmet import unmet_targets
 from app.simulation.ways import Ways
 
@@ -84,7 +85,7 @@ def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
 
 def _traced(
     problem: Problem, arrays: ProblemArrays, actions: Actions
-) -> tuple[simulator.Replay, Trace, simulator.Episodes]:
+) -> tuple[Replay, Trace, simulator.Episodes]:
     """Replay a plan, and trace it.
 
     Nobody is sent home in the trace: at its end every UAV is still at its last stop, which is where the leg
@@ -222,7 +223,7 @@ def _trace(
             trace.legs[s, i], trace.arrivals[s, i] = length, episodes.clock[0, i] + time
             trace.begins[s, i] = visit.begin_after(arrays, 0, j, trace.arrivals[s, i])
             if planned:
-                simulator.deliver(arrays, episodes, i, j, trace.delivered, s)
+                deliver(arrays, episodes, i, j, trace.delivered, s)
             else:
                 for k in range(trace.delivered.shape[2]):
                     trace.delivered[s, i, k] = min(episodes.load[0, i, k], episodes.need[0, j, k])

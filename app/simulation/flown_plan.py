@@ -9,6 +9,7 @@ import numpy as np
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.deliveries import Visits, visits_of
+from app.simulation.replay import deliver
 
 
 class FlownPlan(NamedTuple):
@@ -103,7 +104,7 @@ def _fly(
             plan.leg[i, s] = simulator.leg_to(arrays, episodes, 0, i, j)
             if planned:
                 before = episodes.satisfaction[0]
-                simulator.deliver(arrays, episodes, i, j, delivered, s)
+                deliver(arrays, episodes, i, j, delivered, s)
                 plan.value[i, s] = episodes.satisfaction[0] - before - arrays.terms[0].weight * plan.leg[i, s]
             else:
                 plan.value[i, s] = simulator.act(arrays, episodes, 0, i, j)

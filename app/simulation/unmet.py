@@ -19,17 +19,10 @@ from app.domain.problem import Problem
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
+from app.simulation.from_start import Start, direct_rule, look_from_start, needs_of
 from app.simulation.insertion import new_trial
 from app.simulation.legs import UNREACHABLE
-from app.simulation.openings import (
-    AS_IS,
-    Lookout,
-    Places,
-    Start,
-    direct_rule,
-    look_from_start,
-    needs_of,
-)
+from app.simulation.openings import AS_IS, Lookout, Places
 from app.simulation.planned_insertion import new_planned_trial
 from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.unmet_wording import Wording

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.domain.allocation import LaterDeadline, Relaxation
 from app.domain.problem import Problem
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.openings import DirectNeeds
+from app.simulation.from_start import DirectNeeds
 from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.visit import RULES
 

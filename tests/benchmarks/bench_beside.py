@@ -28,8 +28,8 @@ if "--rates" not in sys.argv:
 
 from library_on_trial import library_of, policies_for_every_size
 
-from app.simulation import simulator
 from app.simulation.arrays import compile_problem
+from app.simulation.evaluation import rewards_of
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import create_solver, parse_parameters
@@ -60,7 +60,7 @@ def rates() -> Iterator[tuple[str, float]]:
         plan = solving("greedy", {}, size, SolverContext())().plan  # type: ignore[attr-defined]  # a solution
         arrays, decisions = compile_problem(problem), len(plan.assignment) * size[0]
         batch = np.repeat(plan.as_array()[None], max(1, 400_000 // decisions), axis=0)
-        seconds = _seconds(lambda a=arrays, b=batch: simulator.replay(a, b, np.zeros(len(b), np.int64)))  # type: ignore[misc]
+        seconds = _seconds(lambda a=arrays, b=batch: rewards_of(a, b))  # type: ignore[misc]
         yield f"simulator, decisions/s, {size[0]} x {size[1]}", len(batch) * decisions / seconds
     with library_of(policies_for_every_size(None)) as url:
         for size in SIZES[:3]:

@@ -11,7 +11,7 @@ from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.deliveries import best_deliveries
-from app.simulation.simulator import replay_delivering
+from app.simulation.replay import replay_delivering
 from app.simulation.visit import ALLOWED
 from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of

@@ -14,8 +14,9 @@ from app.learning.universal.training import trainer
 from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
 from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard
 from app.learning.universal.training.trainer import Schedule, fit
-from app.simulation import simulator, visit
+from app.simulation import visit
 from app.simulation.generator import generate
+from app.simulation.replay import replay as replayed
 from app.solvers.greedy import greedy_plan
 
 SMALL = UniversalConfig(width=16, layers=1, qmix_hidden_dim=4)
@@ -143,7 +144,7 @@ def test_demonstrations_in_another_order_of_uavs_earn_the_same():
     problems = [generate("mixed_loads", 4, 9, 2, rng) for _ in range(6)]
     shown = demonstrate(Shard(4, 9, problems, moves=20_000), rng)
     arrays, plans = trainer._in_random_order(shown.arrays, shown.plans, rng)
-    again = simulator.replay(arrays, plans, np.arange(6))
+    again = replayed(arrays, plans, np.arange(6))
     assert (again.rule == visit.ALLOWED).all()
     assert np.abs(again.reward - shown.rewards).max() < 1e-9
     assert not np.array_equal(plans, shown.plans)

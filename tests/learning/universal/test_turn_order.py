@@ -12,9 +12,9 @@ from app.learning.universal.episodes.turn_order import (
     restore_plans,
     some_orders,
 )
-from app.simulation import simulator
 from app.simulation.arrays import compile_problem, stack
 from app.simulation.generator import generate
+from app.simulation.replay import replay as replayed
 
 
 def test_a_plan_earns_the_same_under_other_indices(make_policy):
@@ -26,7 +26,7 @@ def test_a_plan_earns_the_same_under_other_indices(make_policy):
         several = reorder(stack([arrays] * 3), orders)
         played = play(make_policy(number % 3).agent, several, np.arange(3))
         plans = restore_plans(played.plans, orders)
-        again = simulator.replay(several, reorder_plans(plans, orders), np.arange(3))
+        again = replayed(several, reorder_plans(plans, orders), np.arange(3))
         assert np.array_equal(played.plans, reorder_plans(plans, orders))
         assert np.abs(again.reward - played.rewards).max() < 1e-9
         for plan, reward in zip(plans, played.rewards, strict=True):

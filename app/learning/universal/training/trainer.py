@@ -29,7 +29,7 @@ from app.learning.universal.training.demonstrations import Demonstrations, read_
 from app.learning.universal.updates.learner import Batch, Learner, make_batch
 from app.learning.universal.updates.optimiser import muon
 from app.simulation.arrays import Integers, ProblemArrays
-from app.simulation.simulator import replay
+from app.simulation.replay import replay
 from app.simulation.visit import ALLOWED
 
 TURN_TOKENS = 20_000
