@@ -281,6 +281,22 @@ def test_a_request_that_is_none_is_refused_in_a_sentence(tmp_path, body, says):
     assert isinstance(refused.exception, SystemExit)
 
 
+def test_a_plan_is_evaluated_without_a_server(tmp_path):
+    problem = json.loads((ROOT / "app/examples/paper-5x10.json").read_text())
+    file, home = tmp_path / "request.json", len(problem["targets"])
+    kept = {name: problem[name] for name in ("uavs", "targets", "objective") if name in problem}
+    file.write_text(json.dumps({**kept, "assignment": [[home] * len(problem["uavs"])]}))
+    told = CliRunner().invoke(application, ["evaluate", str(file), "--at", "0.5"])
+    assert told.exit_code == 0
+    answer = json.loads(told.stdout)
+    assert (answer["satisfaction"], answer["distance"]) == (0.0, 0.0)
+    assert answer["remaining"]["uavs"][0]["available_from"] == 0.5
+    file.write_text(json.dumps({**kept, "assignment": [[0]]}))
+    refused = CliRunner().invoke(application, ["evaluate", str(file)])
+    assert refused.exit_code == 1
+    assert "1 actions for" in refused.stderr
+
+
 @pytest.mark.parametrize("given", ["[1]", "7", "{", "null"])
 def test_parameters_that_are_none_are_refused_in_a_sentence(tmp_path, given):
     problem = str(ROOT / "app/examples/paper-5x10.json")

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import wait
@@ -16,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from app.allocation import bounding, tasks
+from app.allocation import bounding, evaluating, tasks
 from app.allocation.answer_time import BOUND
-from app.domain.errors import NoCompatibleSource
+from app.domain.errors import IllegalPlan, NoCompatibleSource
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_to_record
 from app.jobs.model import Progress
@@ -263,6 +264,16 @@ def _combining() -> None:
     solver.solve(problem, 0, never, lambda _progress: None)
 
 
+def _evaluation() -> None:
+    """Evaluate a plan of nothing, which has reasons, and one that breaks a rule."""
+    problem = _small_problem()
+    problem = replace(problem, uavs=tuple(replace(uav, endurance=0.1) for uav in problem.uavs))
+    payload = {"problem": problem_to_record(problem), "at": 0.0}
+    evaluating.evaluate({**payload, "assignment": [[3, 3]]}, _unlimited())
+    with suppress(IllegalPlan):
+        evaluating.evaluate({**payload, "assignment": [[0, 3]]}, _unlimited())
+
+
 def _geography() -> None:
     compile_problem(replace(_small_problem(), crs="wgs84"))
 
@@ -333,6 +344,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "combining": _combining,
     "bound": _bound,
     "geography": _geography,
+    "evaluation": _evaluation,
 }
 """What together loads and compiles all there is."""
 

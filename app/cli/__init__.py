@@ -1,4 +1,4 @@
-"""The command line: start the service and look after it, allocate without it, train, reproduce the paper."""
+"""The command line: the service, allocating and evaluating without it, training, the paper's figures."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import typer
 
 from app.cli.keys import create_key, list_keys, revoke_key
 from app.cli.reproduction import reproduce
-from app.cli.service import allocate, backup, compile_code, serve
+from app.cli.service import allocate, backup, compile_code, evaluate, serve
 from app.cli.training import export, train, train_universal
 
 application = typer.Typer(
     help="Task allocation of UAV swarms with relief materials.", no_args_is_help=True, add_completion=False
 )
-for command in (serve, allocate, train, train_universal, reproduce, export, backup):
+for command in (serve, allocate, evaluate, train, train_universal, reproduce, export, backup):
     application.command()(command)
 application.command("compile")(compile_code)
 

@@ -1,4 +1,4 @@
-"""Start the service, look after it, allocate without it."""
+"""Start the service, look after it, allocate and evaluate without it."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from app.api.access.keys import KeyStore
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.allocation_payload import payload_of
 from app.api.body_validation import BodyValidator
+from app.api.evaluation_models import Evaluation, EvaluationRequest
+from app.api.evaluation_payload import evaluation_payload
 from app.api.json_body import parse_json
 from app.api.server import Server
 from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
@@ -124,6 +126,28 @@ def allocate(
     answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
     written = answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True)
     sys.stdout.write(written + "\n")
+
+
+def evaluate(
+    file: Annotated[Path, typer.Argument(help="A request of POST /evaluate as JSON; - for standard input.")],
+    at: Annotated[float | None, typer.Option(help="Instead of the request's.")] = None,
+) -> None:
+    """Answer as POST /evaluate does, without a server; the answer goes to standard output."""
+    started = time.monotonic()
+    settings = read_settings()
+    with refusals():
+        body = parse_json(sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes())
+        if isinstance(body, dict) and at is not None:
+            body["at"] = at
+        request = BodyValidator(EvaluationRequest).validate(body, settings)
+        assert isinstance(request, EvaluationRequest)
+        # Loads compiled code, which a call for help or a mistake need not wait for.
+        from app.allocation import evaluating  # noqa: PLC0415 - as above
+
+        context = WorkContext.in_process(lambda _progress: None, time_limit_s=None)
+        result = evaluating.evaluate(evaluation_payload(request, settings), context).result
+    answer = Evaluation(job_id="", elapsed_s=time.monotonic() - started, **result)
+    sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True) + "\n")
 
 
 def compile_code(

@@ -8,17 +8,14 @@ from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
 from app.api.evaluation_models import Evaluation, EvaluationRequest
+from app.api.evaluation_payload import evaluation_payload
 from app.api.job_answers import gone, written_answer_of
 from app.api.job_kinds import EVALUATE
 from app.api.json_body import JsonRoute
 from app.api.openapi_examples import EVALUATION_EXAMPLES
 from app.api.problem_details import responses
-from app.api.problem_models import to_problem
 from app.api.routes.allocation import CLIENT_HAS_GONE
 from app.api.services import Served
-from app.domain.errors import InvalidProblem, Violation
-from app.domain.problem import Problem
-from app.domain.records import problem_to_record
 
 router = APIRouter(route_class=JsonRoute, tags=["allocation"])
 
@@ -52,26 +49,9 @@ async def evaluate(
     An illegal plan is refused with every action that breaks a rule; `breaches` has the figures. With `at` the
     answer has the problem that remains at that moment, ready for `POST /allocate`.
     """
-    problem = to_problem(body, services.settings)
-    _require_shape(problem, body.assignment)
-    payload: dict[str, Any] = {"problem": problem_to_record(problem), "assignment": body.assignment}
-    if body.bound:
-        payload["bound_time_limit_s"] = body.bound_time_limit_s
-    if body.at is not None:
-        payload["at"] = body.at
+    payload = evaluation_payload(body, services.settings)
     job, _ = await services.jobs.submit(EVALUATE, payload)
     ended = await services.jobs.wait_for_client(job.id, None, gone(request))
     if ended is None:
         return Response(status_code=CLIENT_HAS_GONE)
     return Response(written_answer_of(ended, {}), media_type="application/json")
-
-
-def _require_shape(problem: Problem, assignment: list[list[int]]) -> None:
-    """Refuse a plan with rows of another length than the swarm has UAVs."""
-    violations = [
-        Violation(f"/assignment/{s}", f"{len(row)} actions for {problem.n_uavs} UAVs")
-        for s, row in enumerate(assignment)
-        if len(row) != problem.n_uavs
-    ]
-    if violations:
-        raise InvalidProblem.of(violations)
