@@ -76,3 +76,10 @@ def test_rows_have_an_action_a_uav(client):
     answer = client.post("/evaluate", json={**PROBLEM, "assignment": [[0]]})
     assert answer.status_code == 422
     assert answer.json()["errors"] == [{"pointer": "/assignment/0", "detail": "1 actions for 2 UAVs"}]
+
+
+def test_an_evaluated_plan_can_be_taken_along(client):
+    asked = {**PROBLEM, "assignment": [[0, 2], [1, 3]]}
+    job_id = client.post("/evaluate", json=asked).json()["job_id"]
+    for form in ("csv", "geojson"):
+        assert client.get(f"/jobs/{job_id}/plan", params={"format": form}).status_code == 200

@@ -7,7 +7,7 @@ from app.api.allocation_models import Allocation
 PLAIN = {
     "uavs": [
         {"x_s": 0, "y_s": 0, "speed": 2, "voyage": 40, "loadlist": [3]},
-        {"x_s": 0, "y_s": 0, "speed": 2, "voyage": 40, "loadlist": [0]},
+        {"x_s": 0, "y_s": 0, "speed": 2, "voyage": 40, "loadlist": [1]},
     ],
     "targets": [{"x": 8, "y": 0, "level": 1, "loadlist": [3], "service_time": 0.5}],
     "objective": {"distance_weight": 0.01},

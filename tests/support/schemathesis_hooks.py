@@ -20,6 +20,7 @@ from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
 
 sys.path.append(str(Path(__file__).parents[2]))
 
+from referee import Illegal, replay
 from world_rules import breaks_rules_of_the_world, has_too_many_corners
 
 from app.domain.errors import InvalidParameters
@@ -63,6 +64,15 @@ def breaks_rules(problem):
     return problem.get("crs") == "wgs84" and any(abs(x) > 180 or abs(y) > 90 for x, y in points)
 
 
+def is_illegal(problem, plan):
+    """Say whether a plan breaks a rule of a problem."""
+    try:
+        replay(problem, plan)
+    except Illegal:
+        return True
+    return False
+
+
 def has_wrong_parameters(asked, default):
     """Say whether an algorithm refuses the parameters it is given; which there are depends on its name."""
     try:
@@ -86,10 +96,14 @@ def is_no_checkpoint(text):
 def breaks_rule_beyond_schemas(case, kind):
     """Say whether a request breaks the rule that it was refused for."""
     body = case.body
-    problem = body if case.path == "/allocate" else body.get("task")
+    problem = body if case.path in ("/allocate", "/evaluate") else body.get("task")
     asked, default = (body, "transfer_qmix") if case.path == "/allocate" else (body.get("train"), "qmix")
     if kind == "invalid-problem":
-        return problem is not None and breaks_rules(problem)
+        rows = body.get("assignment", ()) if case.path == "/evaluate" else ()
+        uneven = any(len(row) != len(body["uavs"]) for row in rows)
+        return uneven or (problem is not None and breaks_rules(problem))
+    if kind == "illegal-plan":
+        return is_illegal(body, body["assignment"] if case.path == "/evaluate" else body["start_plan"])
     if kind == "invalid-parameters":
         return asked is not None and has_wrong_parameters(asked, default)
     if kind == "problem-too-large":

@@ -8,6 +8,9 @@ from typing import Any
 
 from app.domain.problem import UAV, NoFlyZone, Problem, Target
 
+_OWN_PLAN = "evaluated"
+"""In place of an algorithm, of a plan that a client has evaluated."""
+
 _AT_HOME = 1e-9
 """Distances up to this are none: positions of the same place, written differently."""
 
@@ -183,7 +186,7 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
     targets = {target.id: target for target in problem.targets}
     return FlownPlan(
         job_id=answer["job_id"],
-        algorithm=answer["algorithm"],
+        algorithm=answer.get("algorithm", _OWN_PLAN),
         reward=answer["reward"],
         satisfaction=answer["satisfaction"],
         distance=answer["distance"],
