@@ -61,9 +61,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     """
     if "run_time_limit_s" in payload:
         context.end_within(payload["run_time_limit_s"])
-    problem = problem_from_record(payload["problem"])
-    if problem.start_plan:
-        require_legal(problem, Plan(problem.start_plan), "/start_plan")
+    problem = _problem_of(payload)
     algorithm, known = payload["algorithm"], best_known(problem, payload)
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
     if limit.leaves_none_for(algorithm):
@@ -94,7 +92,7 @@ def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResul
         As :func:`allocate` returns it where its algorithm has no time to begin; the algorithm's refusals,
         which need the algorithm, are left out.
     """
-    problem = problem_from_record(payload["problem"])
+    problem = _problem_of(payload)
     limit = TimeLimit(context, answer_time, problem, payload.get("bound_time_limit_s"))
     limit.leave_out_what_can_be()
     return _result(problem, _stand_in(problem, payload, limit, context), payload, limit)
@@ -120,6 +118,14 @@ def complete_reasons(payload: dict[str, Any], context: WorkContext) -> WorkResul
     found = account_of(problem, plan, context.cancelled, answer_time).fields
     changed = {name: found[name] for name in ("unmet", REASONS)}
     return WorkResult(changed, unfinished=found[REASONS] == PENDING)
+
+
+def _problem_of(payload: dict[str, Any]) -> Problem:
+    """Read the problem of an allocation; a plan to begin from that breaks a rule is refused."""
+    problem = problem_from_record(payload["problem"])
+    if problem.start_plan:
+        require_legal(problem, Plan(problem.start_plan), "/start_plan")
+    return problem
 
 
 def _stand_in(problem: Problem, payload: dict[str, Any], limit: TimeLimit, context: WorkContext) -> Found:

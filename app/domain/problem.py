@@ -33,9 +33,10 @@ from app.domain.fields import (
 from app.domain.geometry import distance, longitude_stretch
 from app.domain.matrices import Matrix, longest_leg
 from app.domain.problem_rules import broken_rules_between_fields
+from app.domain.surroundings import Material, NoFlyZone, Wind
 from app.domain.text_fields import Name, Properties, Words
 from app.domain.units import DISTANCE, SPEED, TIME, X, Y
-from app.domain.world_fields import Corners, JointActions
+from app.domain.world_fields import JointActions
 
 Crs = Literal["local", "wgs84"]
 Unloading = Literal["greedy", "planned"]
@@ -125,6 +126,15 @@ class UAV:
     properties: Annotated[
         dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
     ] = field(default=None, kw_only=True, hash=False)
+
+    @property
+    def begins_on_ground(self) -> bool:
+        """Whether its flight begins at its starting point: then it waits there for its first visit."""
+        at_start = (self.x_c, self.y_c) == (self.x_s, self.y_s) and self.home_location in (
+            None,
+            self.location,
+        )
+        return at_start and self.dis == 0.0 and self.airborne == 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,58 +253,6 @@ class Objective:
         Number(low=0.0),
         "Reward lost for each pair of UAV and area that is visited in `start_plan` and not in the plan",
     ] = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Material:
-    """A kind of relief material."""
-
-    name: Annotated[
-        str,
-        Identifier(stem="material", unique=False),
-        "Text for people; default: material-1, material-2, … by place in the list",
-    ]
-    weight: Annotated[float, Number(low=0.0), "Weight of one unit"] = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class NoFlyZone:
-    """A polygon that must not be flown through; its border may be touched.
-
-    A last corner that is the first one again, which closes the polygon in some formats, is dropped.
-    """
-
-    id: Annotated[
-        str,
-        Identifier(stem="zone"),
-        "Unique among the zones; default: zone-1, zone-2, … by place in the list",
-    ]
-    polygon: Annotated[
-        tuple[tuple[float, float], ...],
-        Corners(),
-        "Corners `[x, y]` in either direction, at least 3; no two sides cross. A last corner that is the "
-        "first one again is dropped",
-    ]
-    name: Annotated[str | None, Name(), "Text for people, which need not be unique; default: the id"] = None
-    properties: Annotated[
-        dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
-    ] = field(default=None, hash=False)
-
-    def __post_init__(self) -> None:
-        if len(self.polygon) > 1 and self.polygon[0] == self.polygon[-1]:
-            object.__setattr__(self, "polygon", self.polygon[:-1])
-
-
-@dataclass(frozen=True, slots=True)
-class Wind:
-    """A wind that is the same everywhere."""
-
-    speed: Annotated[float, Number(low=0.0, unit=SPEED), f"Its speed: {SPEED}"]
-    towards: Annotated[
-        float,
-        Number(low=-360.0, high=360.0),
-        "Where it blows to, in degrees clockwise from north, which is +y",
-    ]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from app.domain.fields import (
     declared_fields,
 )
 from app.domain.matrices import Matrix
-from app.domain.problem import UAV, Material, NoFlyZone, Objective, Problem, Target, Wind
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.surroundings import Material, NoFlyZone, Wind
 from app.domain.world_fields import FEWEST_CORNERS, Corners, Table
 
 PAGE = Path(__file__).with_name("README.md")

@@ -29,7 +29,7 @@ def odd_times(problem: Problem) -> Iterator[Found]:
             (
                 f"/targets/{j}/earliest",
                 f"a visit of {target.id!r} begins at {target.earliest:g} at the earliest, and its deadline, "
-                f"{target.deadline:g}, is for an arrival: whoever comes in time waits",
+                f"{target.deadline:g}, is for an arrival: a UAV that comes in time waits",
             )
             for j, target in enumerate(problem.targets)
             if target.deadline is not None and target.earliest > max(0.0, target.deadline)

@@ -81,7 +81,7 @@ class Table(Kind):
 
     @property
     def conversions(self) -> tuple[Conversion, Conversion] | None:
-        """Return what makes rows of it, None where there is no number; whoever has the table reads rows."""
+        """Return what makes rows of it, None where there is no number; rows are read as a table later."""
         return _rows, lambda rows: rows
 
 

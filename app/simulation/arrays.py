@@ -188,13 +188,7 @@ def _uavs(problem: Problem, legs: LegArrays) -> Records:
     columns["until"] = [np.inf if u.available_until is None else u.available_until for u in uavs]
     columns["endurance"] = [np.inf if u.endurance is None else u.endurance * (1.0 - u.reserve) for u in uavs]
     columns["watched"] = np.isfinite(columns["until"]) | np.isfinite(columns["endurance"])
-    columns["on_ground"] = [
-        (u.x_c, u.y_c) == (u.x_s, u.y_s)
-        and u.home_location in (None, u.location)
-        and u.dis == 0.0
-        and u.airborne == 0.0
-        for u in uavs
-    ]
+    columns["on_ground"] = [u.begins_on_ground for u in uavs]
     columns["start_home"], columns["start_home_time"] = legs.start_home, legs.start_home_time
     columns["leg_class"] = legs.leg_class
     return columns

@@ -1,7 +1,7 @@
 """Columns of :class:`~app.simulation.arrays.ProblemArrays`: what a problem, a UAV and a target have.
 
-A structured array is one argument of compiled code, however many columns it has: code that is compiled for
-thirty arrays takes half as long again as for fifteen.
+A structured array is one argument of compiled code, however many columns it has. With twelve arrays more the
+replay took 18 s to compile instead of 11.
 """
 
 from __future__ import annotations

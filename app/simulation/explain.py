@@ -88,7 +88,7 @@ def _traced(
 ) -> tuple[Replay, Trace, simulator.Episodes]:
     """Replay a plan, and trace it.
 
-    Nobody is sent home in the trace: at its end every UAV is still at its last stop, which is where the leg
+    No UAV is sent home in the trace: at its end every one is still at its last stop, which is where the leg
     home begins and where one more visit would begin.
     """
     result, given = replayed(problem, arrays, actions)

@@ -92,27 +92,8 @@ def carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
 @simulator.compiled
 def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
     """Rule that a UAV's flight from its start to a target breaks, whatever it unloads and is committed to."""
-    length = visit.leg(arrays, 0, i, visit.START, j)
-    time = visit.leg_time(arrays, 0, i, visit.START, j, length)
-    if visit.is_barred(arrays, 0, i, visit.START, j):
-        return visit.BARRED
-    if visit.is_out_of_range(
-        arrays, 0, i, j, arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
-    ):
-        return visit.OUT_OF_RANGE
-    clock = visit.ready(arrays, 0, i)
-    if visit.is_late(clock + time, arrays.areas[0, j].deadline):
-        return visit.TOO_LATE
-    if visit.is_watched(arrays, 0, i):
-        end = visit.departure_after(arrays, 0, j, clock + time)
-        aloft = visit.aloft_after(
-            arrays, 0, i, True, visit.airborne(arrays, 0, i), clock, clock + time, end, j
-        )
-        if visit.exceeds_endurance(arrays, 0, i, j, aloft):
-            return visit.TOO_LONG_ALOFT
-        if visit.lands_late(arrays, 0, i, j, end):
-            return visit.HOME_TOO_LATE
-    return visit.ALLOWED
+    flown, clock, aloft = arrays.uavs[0, i].dis, visit.ready(arrays, 0, i), visit.airborne(arrays, 0, i)
+    return visit.reach_rule(arrays, 0, i, visit.START, j, visit.FREE, flown, clock, aloft)
 
 
 @simulator.compiled

@@ -76,6 +76,24 @@ class _LegClass(NamedTuple):
     members: Integers
 
 
+def places_of(problem: Problem) -> Floats:
+    """Return the current positions of M UAVs, their starting points, and N targets, (2M + N, 2)."""
+    uavs = problem.uavs
+    places = [(u.x_c, u.y_c) for u in uavs] + [(u.x_s, u.y_s) for u in uavs]
+    return np.array(places + [(t.x, t.y) for t in problem.targets], np.float64)
+
+
+def zones_of(problem: Problem) -> list[Floats]:
+    """Return the corners of each no-fly zone, (V, 2)."""
+    return [np.array(zone.polygon, np.float64) for zone in problem.no_fly_zones]
+
+
+def wind_of(problem: Problem) -> Wind | None:
+    """Return the wind; None where the air is still."""
+    given = problem.wind
+    return None if given is None or given.speed == 0.0 else Wind(given.speed, given.towards)
+
+
 def leg_arrays(problem: Problem) -> LegArrays:
     """Work out the legs of a problem.
 
@@ -84,9 +102,7 @@ def leg_arrays(problem: Problem) -> LegArrays:
     ProblemTooLarge
         If there are more legs than :data:`MOST_LEGS`.
     """
-    wind = None
-    if problem.wind is not None and problem.wind.speed > 0.0:
-        wind = Wind(problem.wind.speed, problem.wind.towards)
+    wind = wind_of(problem)
     if problem.matrices is not None:
         classes = _of_matrices(problem)
     elif problem.no_fly_zones or wind is not None:
@@ -141,10 +157,7 @@ def _of_matrices(problem: Problem) -> list[_LegClass]:
 
 def _of_places(problem: Problem, wind: Wind | None) -> list[_LegClass]:
     uavs = problem.uavs
-    places = [(u.x_c, u.y_c) for u in uavs] + [(u.x_s, u.y_s) for u in uavs]
-    places += [(t.x, t.y) for t in problem.targets]
-    zones = [np.array(zone.polygon, np.float64) for zone in problem.no_fly_zones]
-    legs = legs_between(problem.crs, np.array(places, np.float64), zones, wind)
+    legs = legs_between(problem.crs, places_of(problem), zones_of(problem), wind)
     if wind is None:
         return [_LegClass(legs, None, np.arange(len(uavs)))]
     members: dict[float, list[int]] = {}

@@ -13,9 +13,9 @@ from app.domain.plan import Plan
 from app.domain.problem import ROUNDING, UAV, Problem, Target
 from app.simulation.breaches import breaches_of
 from app.simulation.explain import timed_routes
+from app.simulation.legs import wind_of, zones_of
 from app.travel.choice import legs_between
 from app.travel.legs import Legs, Way
-from app.travel.wind import Wind
 
 
 def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
@@ -113,8 +113,6 @@ class _Flight:
 
     def _fly(self, route: LandingRoute) -> UAV:
         uav, at = self.uav, self._at
-        on_ground = (uav.x_c, uav.y_c) == (uav.x_s, uav.y_s) and self._home == uav.location
-        on_ground = on_ground and uav.dis == 0.0 and uav.airborne == 0.0
         clock, flown, aloft, place = uav.available_from, uav.dis, uav.airborne, None
         if at <= clock:
             return uav
@@ -122,7 +120,7 @@ class _Flight:
             stop = self.rest[0]
             target = self._target(stop)
             wait = 0.0
-            if on_ground and place is None:
+            if uav.begins_on_ground and place is None:
                 # It takes off no sooner than it has to, and no later than its deadline lets it.
                 last = math.inf if target.deadline is None else target.deadline
                 wait = max(0.0, min(stop.begin_time, last) - stop.arrival_time)
@@ -205,9 +203,7 @@ class _Flight:
 
 
 def _legs(problem: Problem, start: tuple[float, float], end: tuple[float, float]) -> Legs:
-    zones = [np.array(zone.polygon, np.float64) for zone in problem.no_fly_zones]
-    wind = None if problem.wind is None else Wind(problem.wind.speed, problem.wind.towards)
-    return legs_between(problem.crs, np.array([start, end], np.float64), zones, wind)
+    return legs_between(problem.crs, np.array([start, end], np.float64), zones_of(problem), wind_of(problem))
 
 
 def _point_on(way: Way, elapsed: float, crs: str) -> tuple[float, float, float]:

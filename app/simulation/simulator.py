@@ -16,14 +16,8 @@ from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.visit import (
     ALLOWED,
-    BARRED,
-    COMMITTED_ELSEWHERE,
-    HOME_TOO_LATE,
-    OUT_OF_RANGE,
     RETURNING,
     START,
-    TOO_LATE,
-    TOO_LONG_ALOFT,
     UNLOADS_NOTHING,
     Function,
     air_length,
@@ -38,18 +32,13 @@ from app.simulation.visit import (
     departure_after,
     discount,
     earned_by,
-    exceeds_endurance,
     has_bonus,
     has_closing_cost,
-    is_barred,
-    is_committed_elsewhere,
-    is_late,
-    is_out_of_range,
     is_watched,
-    lands_late,
     left_of,
     leg,
     leg_time,
+    reach_rule,
     ready,
     time_home,
     way_home,
@@ -216,24 +205,10 @@ def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -
 @merged
 def reach_verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> int:
     """All of rule 2 but whether something is unloaded: ``ALLOWED``, or the rule that forbids the visit."""
-    p, at, clock = episodes.problem[b], episodes.at[b, i], episodes.clock[b, i]
-    length = leg(arrays, p, i, at, j)
-    time = leg_time(arrays, p, i, at, j, length)
-    if is_out_of_range(arrays, p, i, j, episodes.flown[b, i] + air_length(arrays, p, i, length, time)):
-        return BARRED if is_barred(arrays, p, i, at, j) else OUT_OF_RANGE
-    if is_late(clock + time, arrays.areas[p, j].deadline):
-        return TOO_LATE
-    if is_committed_elsewhere(arrays, p, i, episodes.visits[b, i], j):
-        return COMMITTED_ELSEWHERE
-    if is_watched(arrays, p, i):
-        end = departure_after(arrays, p, j, clock + time)
-        first = episodes.visits[b, i] == 0
-        aloft = aloft_after(arrays, p, i, first, episodes.aloft[b, i], clock, clock + time, end, j)
-        if exceeds_endurance(arrays, p, i, j, aloft):
-            return TOO_LONG_ALOFT
-        if lands_late(arrays, p, i, j, end):
-            return HOME_TOO_LATE
-    return ALLOWED
+    return reach_rule(
+        arrays, episodes.problem[b], i, episodes.at[b, i], j,
+        episodes.visits[b, i], episodes.flown[b, i], episodes.clock[b, i], episodes.aloft[b, i],
+    )  # fmt: skip
 
 
 @compiled

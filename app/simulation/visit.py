@@ -33,6 +33,9 @@ each of its callers. Functions that are not inlined take only the arrays that th
 START = -1
 """Value of ``at`` for a UAV that is still where the request has it."""
 
+FREE = -1
+"""In place of a number of visits: the UAV has made none, and its commitments do not count."""
+
 ALLOWED = 0
 RETURNING = 1
 OUT_OF_RANGE = 2
@@ -317,6 +320,48 @@ def has_closing_cost(arrays: ProblemArrays, p: int) -> bool:
 def closing_cost(arrays: ProblemArrays, p: int, makespan: float, changes: float) -> float:
     """Reward lost for the makespan and for changes (section 10)."""
     return arrays.terms[p].makespan * makespan + arrays.terms[p].change * changes
+
+
+@inlined
+def reach_rule(
+    arrays: ProblemArrays,
+    p: int,
+    i: int,
+    at: int,
+    j: int,
+    visits: int,
+    flown: float,
+    clock: float,
+    aloft: float,
+) -> int:
+    """All of rule 2 but whether something is unloaded: ``ALLOWED``, or the rule that forbids a visit.
+
+    Parameters
+    ----------
+    arrays, p, i, at, j
+        As everywhere.
+    visits
+        How many visits the UAV has made; ``FREE`` before the first, whatever it is committed to.
+    flown, clock, aloft
+        Air length, clock, and time in the air when it sets out.
+    """
+    length = leg(arrays, p, i, at, j)
+    time = leg_time(arrays, p, i, at, j, length)
+    rule = ALLOWED
+    if is_out_of_range(arrays, p, i, j, flown + air_length(arrays, p, i, length, time)):
+        rule = BARRED if is_barred(arrays, p, i, at, j) else OUT_OF_RANGE
+    elif is_late(clock + time, arrays.areas[p, j].deadline):
+        rule = TOO_LATE
+    elif visits != FREE and is_committed_elsewhere(arrays, p, i, visits, j):
+        rule = COMMITTED_ELSEWHERE
+    elif is_watched(arrays, p, i):
+        end = departure_after(arrays, p, j, clock + time)
+        in_air = aloft_after(arrays, p, i, visits <= 0, aloft, clock, clock + time, end, j)
+        if exceeds_endurance(arrays, p, i, j, in_air):
+            rule = TOO_LONG_ALOFT
+        elif lands_late(arrays, p, i, j, end):
+            rule = HOME_TOO_LATE
+    return rule
 
 
 def worths(arrays: ProblemArrays) -> Floats:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import cached_property
 
-import numpy as np
-
 from app.domain.allocation import Path
 from app.domain.geometry import distance
 from app.domain.problem import Problem
+from app.simulation.legs import places_of, zones_of
 from app.simulation.visit import START
 from app.travel.around_zones import LegsAroundZones
 
@@ -24,13 +23,8 @@ class Ways:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        uavs, targets = problem.uavs, problem.targets
         # In the order in which the lengths were worked out, so that of two ways of one length it is that one.
-        self._places = [
-            *((uav.x_c, uav.y_c) for uav in uavs),
-            *((uav.x_s, uav.y_s) for uav in uavs),
-            *((target.x, target.y) for target in targets),
-        ]
+        self._places = places_of(problem)
 
     def to(self, i: int, at: int, j: int, length: float) -> Path | None:
         """Return the points that UAV `i` flies over from where it is to target `j`.
@@ -63,7 +57,7 @@ class Ways:
         problem = self._problem
         if not problem.no_fly_zones:
             return None
-        straight = distance(problem.crs, *self._places[origin], *self._places[destination])
+        straight = distance(problem.crs, *self._places[origin].tolist(), *self._places[destination].tolist())
         if length <= straight * _LONGER:
             return None
         way = self._legs.way(origin, destination, problem.uavs[i].speed)
@@ -74,5 +68,4 @@ class Ways:
     @cached_property
     def _legs(self) -> LegsAroundZones:
         """The legs in still air: wind does not change a way, and those that it forbids are in no plan."""
-        zones = [np.array(zone.polygon, np.float64) for zone in self._problem.no_fly_zones]
-        return LegsAroundZones(self._problem.crs, np.array(self._places, np.float64), zones)
+        return LegsAroundZones(self._problem.crs, self._places, zones_of(self._problem))

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.domain.problem import UAV, NoFlyZone, Problem, Target, Wind
+from app.domain.matrices import Matrix
+from app.domain.problem import UAV, Problem, Target
+from app.domain.surroundings import NoFlyZone, Wind
 from app.simulation.generator import Family, uniform
 
 _SKILLS = ("cold chain", "winch", "night flight")
@@ -75,6 +77,35 @@ def fair(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator
     return replace(problem, objective=objective)
 
 
+def partly(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `fair` without haste, where most areas have got a part of what they asked for."""
+    problem = fair(n_uavs, n_targets, n_materials, rng)
+    targets = tuple(
+        replace(t, requested=tuple(need + float(rng.integers(0, 6)) for need in t.loadlist))
+        for t in problem.targets
+    )
+    objective = replace(problem.objective, half_life=None, makespan_weight=0.0)
+    return replace(problem, targets=targets, objective=objective)
+
+
+def matrix(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `uniform`, with legs of two kinds of UAV as matrices: not symmetric, some missing."""
+    problem = uniform(n_uavs, n_targets, n_materials, rng)
+    places = np.array([(u.x_s, u.y_s) for u in problem.uavs] + [(t.x, t.y) for t in problem.targets])
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    matrices = {}
+    for profile in ("multirotor", "fixed-wing"):
+        distance = apart * rng.uniform(1.0, 1.4, apart.shape)
+        distance[rng.random(apart.shape) < 0.03] = np.inf
+        np.fill_diagonal(distance, 0.0)
+        matrices[profile] = Matrix(distance, distance / rng.uniform(0.8, 1.6, apart.shape))
+    uavs = tuple(
+        replace(u, location=i, profile=str(rng.choice(list(matrices)))) for i, u in enumerate(problem.uavs)
+    )
+    targets = tuple(replace(t, location=n_uavs + j) for j, t in enumerate(problem.targets))
+    return replace(problem, uavs=uavs, targets=targets, matrices=matrices)
+
+
 def _whole_needs(problem: Problem, rng: np.random.Generator) -> Problem:
     """Let every UAV carry enough for all that it can visit, so that areas are visited once or not at all."""
     most = sum(sorted((sum(t.loadlist) for t in problem.targets), reverse=True)[: problem.max_steps])
@@ -97,6 +128,6 @@ def _zone(problem: Problem, number: int, rng: np.random.Generator) -> NoFlyZone:
 
 
 WORLD_FAMILIES: Mapping[str, Family] = {
-    each.__name__: each for each in (windows, zones, windy, promised, fair)
+    each.__name__: each for each in (windows, zones, windy, promised, fair, partly, matrix)
 }
 """The families by name."""

@@ -19,7 +19,8 @@ from app.api.plan_formats.geojson import geojson
 from app.api.plan_formats.mission import Delivery, Ending, FlightChoices
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
-from app.domain.problem import UAV, NoFlyZone, Problem, Target
+from app.domain.problem import UAV, Problem, Target
+from app.domain.surroundings import NoFlyZone
 
 WAYPOINT, RETURN, LAND, TAKEOFF, DELAY, PLACE, SPEED, SERVO, GRIPPER = 16, 20, 21, 22, 93, 94, 178, 183, 211
 

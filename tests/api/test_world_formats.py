@@ -19,8 +19,9 @@ from app.api.plan_formats.mission import Delivery, Ending, FlightChoices
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import plan_file, waypoint_file
 from app.domain.plan import Plan
-from app.domain.problem import UAV, NoFlyZone, Objective, Problem, Target, Wind
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import to_record
+from app.domain.surroundings import NoFlyZone, Wind
 from app.simulation.explain import explain
 
 WAYPOINT, LOITER, RETURN, TAKEOFF, SPEED = 16, 19, 20, 22, 178

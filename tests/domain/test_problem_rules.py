@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from app.domain.errors import InvalidProblem
 from app.domain.matrices import Matrix
-from app.domain.problem import UAV, Material, NoFlyZone, Objective, Problem, Target, Wind
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_from_record, problem_to_record
+from app.domain.surroundings import Material, NoFlyZone, Wind
 
 BASE = Problem(
     uavs=(

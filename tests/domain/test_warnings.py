@@ -12,7 +12,8 @@ from problems import on_earth, random_problem
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
-from app.domain.problem import UAV, Objective, Problem, Target, Wind
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.surroundings import Wind
 from app.domain.warnings import CODES, problem_warnings
 from app.settings import Settings
 from app.simulation.generator import FAMILIES, generate

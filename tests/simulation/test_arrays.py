@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.domain.problem import Wind
+from app.domain.surroundings import Wind
 from app.simulation.arrays import AXES, OF_UAVS, alike, compile_problem, part, stack
 from app.simulation.generator import generate
 

@@ -15,8 +15,9 @@ from app.domain.errors import IllegalPlan
 from app.domain.fields import Part, declared_fields
 from app.domain.matrices import Matrix
 from app.domain.plan import Plan
-from app.domain.problem import UAV, Material, NoFlyZone, Objective, Problem, Target, Wind
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record, to_record
+from app.domain.surroundings import Material, NoFlyZone, Wind
 from app.domain.world_use import uses_world
 from app.simulation import visit
 from app.simulation.arrays import compile_problem

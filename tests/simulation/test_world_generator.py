@@ -13,6 +13,8 @@ HAS = {
     "zones": lambda p: len(p.no_fly_zones) == 4,
     "windy": lambda p: p.wind.speed < min(u.speed for u in p.uavs),
     "promised": lambda p: any(t.skills for t in p.targets) and any(u.excluded for u in p.uavs),
+    "partly": lambda p: any(t.requested != t.loadlist for t in p.targets) and p.objective.minimum_share,
+    "matrix": lambda p: {u.profile for u in p.uavs} == set(p.matrices),
     "fair": lambda p: p.objective.half_life and p.objective.minimum_share,
 }
 

@@ -8,7 +8,8 @@ from problems import random_problem
 
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
-from app.domain.problem import NoFlyZone, Problem, Wind
+from app.domain.problem import Problem
+from app.domain.surroundings import NoFlyZone, Wind
 
 
 def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:

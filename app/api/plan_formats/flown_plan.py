@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.domain.problem import UAV, NoFlyZone, Problem, Target
+from app.domain.problem import UAV, Problem, Target
+from app.domain.surroundings import NoFlyZone
 
 _OWN_PLAN = "evaluated"
 """In place of an algorithm, of a plan that a client has evaluated."""
@@ -117,7 +118,7 @@ class FlownRoute:
     @property
     def waiting_on_ground(self) -> float:
         """Time that it waits for its first visit before it takes off."""
-        return self.stops[0].waiting if self.stops and self.starts_at_home else 0.0
+        return self.stops[0].waiting if self.stops and self.uav.begins_on_ground else 0.0
 
     def arrives(self, number: int) -> float:
         """When it is at a stop, counted from 0, if it takes off no sooner than it has to."""

@@ -9,8 +9,9 @@ from typing import Any
 from app.api.plan_formats.antimeridian import closed, cut_line, cut_ring
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
 from app.domain.fields import declared_fields
-from app.domain.problem import UAV, NoFlyZone, Target
+from app.domain.problem import UAV, Target
 from app.domain.records import item_to_record
+from app.domain.surroundings import NoFlyZone
 
 MEDIA_TYPE = "application/geo+json"
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
 from app.domain.geometry import unrolled
-from app.domain.problem import UAV, NoFlyZone, Target
+from app.domain.problem import UAV, Target
+from app.domain.surroundings import NoFlyZone
 
 _WIDTH, _HEIGHT, _MARGIN = 720.0, 440.0, 24.0
 _COLOURS = ("#0b6e99", "#b4451f", "#3d7a2a", "#7a3f9d", "#a17a00", "#00736b", "#a8325e", "#4a5568")

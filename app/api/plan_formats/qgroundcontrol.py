@@ -17,7 +17,7 @@ from app.api.plan_formats.mission import (
     mission,
     speed_m_s,
 )
-from app.domain.problem import NoFlyZone
+from app.domain.surroundings import NoFlyZone
 
 _ARDUPILOT = 3
 _MULTICOPTER = 2
