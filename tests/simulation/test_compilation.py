@@ -131,7 +131,7 @@ def test_a_changed_rule_is_followed_wherever_it_is_inlined(tmp_path):
     assert who_visits_target_0() == "True"
     simulator = tmp_path / "app" / "simulation" / "simulator.py"
     rule = "    if episodes.ret[b, i]:\n        return RETURNING\n"
-    changed = simulator.read_text().replace(rule, rule + "    if j == 0:\n        return OUT_OF_RANGE\n")
+    changed = simulator.read_text().replace(rule, rule + "    if j == 0:\n        return UNLOADS_NOTHING\n")
     assert changed != simulator.read_text()
     simulator.write_text(changed)
     assert who_visits_target_0() == "False"
