@@ -153,6 +153,7 @@ class Settings(BaseSettings):
     max_uavs: int = Field(default=1000, ge=1, description="Most UAVs in a problem")
     max_targets: int = Field(default=2000, ge=1, description="Most rescue areas in a problem")
     max_materials: int = Field(default=64, ge=1, description="Most kinds of material in a problem")
+    max_bases: int = Field(default=100, ge=0, description="Most bases in a problem")
     max_no_fly_zones: int = Field(default=200, ge=0, description="Most no-fly zones in a problem")
     max_zone_corners: int = Field(
         default=1000, ge=0, description="Most corners of all no-fly zones of a problem together"

@@ -65,7 +65,7 @@ def everything(problem: Problem) -> float:
 
 def proof_answer(problem: Problem, proof: Proof | None) -> dict[str, Any] | None:
     """Return what the algorithm knows, which says nothing of plans whose unloading is planned."""
-    if proof is None or problem.objective.unloading != "greedy":
+    if proof is None or problem.plans_unloading:
         return None
     return {"bound": proof.bound, "proven": proof.proven}
 

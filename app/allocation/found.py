@@ -86,6 +86,7 @@ def _plan_of(problem: Problem, assignment: Any) -> Plan:
     for row in assignment:
         if len(row) != problem.n_uavs:
             raise ValueError(f"a joint action has {len(row)} actions, not {problem.n_uavs}")
-        if not all(type(action) is int and 0 <= action <= problem.n_targets for action in row):
-            raise ValueError(f"an action is not a whole number from 0 to {problem.n_targets}")
+        last = problem.n_targets + problem.n_bases
+        if not all(type(action) is int and 0 <= action <= last for action in row):
+            raise ValueError(f"an action is not a whole number from 0 to {last}")
     return Plan(tuple(map(tuple, assignment)))

@@ -27,7 +27,7 @@ def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
         With a violation for every action that breaks a rule, and the figures in ``details["breaches"]``.
         Where unloading is planned, with the first one.
     """
-    if problem.objective.unloading != "greedy":
+    if problem.plans_unloading:
         reward_of(problem, plan)
         return
     breaches = breaches_of(problem, plan)

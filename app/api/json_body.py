@@ -130,6 +130,7 @@ def longest_list(settings: Settings) -> int:
         settings.max_uavs,
         settings.max_targets,
         settings.max_materials,
+        settings.max_bases,
         settings.max_no_fly_zones,
         settings.max_zone_corners,
         settings.max_locations,

@@ -121,7 +121,7 @@ def _sizes_of_words(lists: Mapping[str, Sequence[Any]], settings: Settings) -> I
     for name, kind in _LISTS.items():
         for each in declared_fields(kind.of):
             if isinstance(each.kind, Words):
-                words = list(map(attrgetter(each.name), lists[name]))
+                words = [words or () for words in map(attrgetter(each.name), lists[name])]
                 longest = max(map(len, words), default=0)
                 index = next((at for at, some in enumerate(words) if len(some) == longest), 0)
                 what = "words" if each.kind.ids_of is None else "ids"

@@ -9,8 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 from app.domain.plan import Plan
+
+Path = tuple[tuple[float, float], ...]
+"""Points flown over, the first and the last place among them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,36 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True)
+class Reload:
+    """One landing of a UAV at a base, where it takes up material and flies on.
+
+    Attributes
+    ----------
+    base_id
+        The base.
+    step, arrival_time, distance
+        As of a visit.
+    loaded
+        Amounts taken up, K of them.
+    departure_time
+        When it may take off again.
+    path
+        Points flown over on the way to it; None where that is a straight line.
+    kind
+        Always ``reload``; visits of such problems have ``visit``.
+    """
+
+    base_id: str
+    step: int
+    arrival_time: float
+    distance: float
+    loaded: tuple[float, ...]
+    departure_time: float
+    path: Path | None
+    kind: Literal["reload"] = "reload"
+
+
+@dataclass(frozen=True, slots=True)
 class Route:
     """What one UAV does: its stops in order, then home.
 
@@ -51,17 +85,18 @@ class Route:
     return_distance
         Length of the leg home; 0 for a UAV that was already returning.
     stops
-        Its visits.
+        Its visits, and reloads.
     """
 
     uav_id: str
     distance: float
     return_distance: float
-    stops: tuple[Stop, ...]
+    stops: tuple[Stop | Reload, ...]
 
-
-Path = tuple[tuple[float, float], ...]
-"""Points flown over, the first and the last place among them."""
+    @property
+    def visits(self) -> tuple[Stop, ...]:
+        """Its visits alone."""
+        return tuple(stop for stop in self.stops if isinstance(stop, Stop))
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +125,19 @@ class TimedStop(Stop):
 
 
 @dataclass(frozen=True, slots=True)
+class Visit(TimedStop):
+    """A visit of a problem with bases, where there are other stops, too.
+
+    Attributes
+    ----------
+    kind
+        Always ``visit``.
+    """
+
+    kind: Literal["visit"] = "visit"
+
+
+@dataclass(frozen=True, slots=True)
 class Landing:
     """The end of a route.
 
@@ -103,6 +151,19 @@ class Landing:
 
     time: float
     path: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class LandingSomewhere(Landing):
+    """The end of a route where there are bases.
+
+    Attributes
+    ----------
+    base_id
+        The base at which the UAV has landed; None where that is its starting point, or it need not return.
+    """
+
+    base_id: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,3 +340,32 @@ class TimedAllocation(Allocation):
 
     makespan: float
     changes: int
+
+
+@dataclass(frozen=True, slots=True)
+class BaseLeft:
+    """A base at the end of a plan.
+
+    Attributes
+    ----------
+    base_id
+        The base.
+    stock
+        Amounts left, K of them; None where there is as much as is asked for.
+    """
+
+    base_id: str
+    stock: tuple[float, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class SortieAllocation(TimedAllocation):
+    """An allocation where there are bases.
+
+    Attributes
+    ----------
+    bases
+        What is left of each stock.
+    """
+
+    bases: tuple[BaseLeft, ...]

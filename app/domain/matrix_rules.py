@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Rules = Iterator[tuple[str, str]]
 
-_PLACES = (("uavs", "location"), ("uavs", "home_location"), ("targets", "location"))
+_PLACES = (("uavs", "location"), ("uavs", "home_location"), ("targets", "location"), ("bases", "location"))
 """Fields that are rows of the matrices, by the list of their items."""
 
 _NAMED = 10
@@ -44,7 +44,7 @@ def broken_rules_of_matrices(problem: Problem) -> Rules:
             row, at = getattr(item, field), f"/{name}/{index}/{field}"
             if row is None:
                 if field == "location":
-                    yield at, "is missing; with `matrices` every UAV and every target has one"
+                    yield at, "is missing; with `matrices` every UAV, target and base has one"
             elif size is not None and not 0 <= row < size:
                 yield at, f"{row} is not in 0..{size - 1}, the rows of the `matrices`"
 

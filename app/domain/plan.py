@@ -13,7 +13,9 @@ Actions = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Plan:
-    """A list of joint actions ``[x_1 … x_M]``, ``x_i`` in 0..N; N sends UAV i home.
+    """A list of joint actions ``[x_1 … x_M]``, ``x_i`` in 0..N+D.
+
+    Those below N are visits, N sends UAV i home, and N + 1 + d sends it to base d, to reload.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ from app.domain.fields import (
 from app.domain.geometry import distance, longitude_stretch
 from app.domain.matrices import Matrix, longest_leg
 from app.domain.problem_rules import broken_rules_between_fields
-from app.domain.surroundings import Material, NoFlyZone, Wind
+from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 from app.domain.text_fields import Name, Properties, Words
 from app.domain.units import DISTANCE, SPEED, TIME, X, Y
 from app.domain.world_fields import JointActions
@@ -95,6 +95,12 @@ class UAV:
     available_until: Annotated[
         float | None, Number(unit=TIME), "Latest time to have landed; default: no limit"
     ] = field(default=None, kw_only=True)
+    full_load: Annotated[
+        tuple[float, ...] | None,
+        Amounts(same_as="loadlist"),
+        "Amounts that it leaves a base with, one a material, as far as they are in stock; default: its "
+        "`loadlist`",
+    ] = field(default=None, kw_only=True)
     capacity: Annotated[
         float | None,
         Number(low=0.0),
@@ -111,6 +117,11 @@ class UAV:
         Words(ids_of="targets"),
         "Ids of areas that it visits first, in this order: promised, or under way",
     ] = field(default=(), kw_only=True)
+    bases: Annotated[
+        tuple[str, ...] | None,
+        Words(ids_of="bases"),
+        "Ids of the bases at which it may land and reload; default: all",
+    ] = field(default=None, kw_only=True)
     location: Annotated[int | None, Whole(0), "Where it is, as a row of the `matrices`; needed with them"] = (
         field(default=None, kw_only=True)
     )
@@ -135,6 +146,11 @@ class UAV:
             self.location,
         )
         return at_start and self.dis == 0.0 and self.airborne == 0.0
+
+    @property
+    def full(self) -> tuple[float, ...]:
+        """Amounts that it leaves a base with, as far as they are in stock."""
+        return self.loadlist if self.full_load is None else self.full_load
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +301,11 @@ class Problem:
         Items(Material, called="materials"),
         "The kinds of material, in the order of every `loadlist`; default: material-1, … of weight 1",
     ] = ()
+    bases: Annotated[
+        tuple[Base, ...],
+        Items(Base, called="bases"),
+        "Where UAVs land, reload and take off again; at the end each lands at the nearest, or where it began",
+    ] = ()
     no_fly_zones: Annotated[
         tuple[NoFlyZone, ...], Items(NoFlyZone, called="no-fly zones"), "What must not be flown through"
     ] = ()
@@ -329,9 +350,23 @@ class Problem:
         return len(self.targets)
 
     @property
+    def n_bases(self) -> int:
+        """Number of bases, D; action N + 1 + d sends a UAV to base d, to reload."""
+        return len(self.bases)
+
+    @property
     def n_materials(self) -> int:
         """Number of kinds of material, K."""
         return len(self.uavs[0].loadlist)
+
+    @property
+    def plans_unloading(self) -> bool:
+        """Whether how much a visit unloads is decided with the plan.
+
+        With bases it is not yet, whatever the objective says: visits unload all that is needed and carried,
+        which is one of the plans that planned unloading allows.
+        """
+        return self.objective.unloading == "planned" and not self.bases
 
     @property
     def weights(self) -> tuple[float, ...]:
@@ -347,8 +382,9 @@ class Problem:
         """
         if self.matrices is not None:
             return longest_leg(self.matrices.values()) or 1.0
-        xs = [x for u in self.uavs for x in (u.x_s, u.x_c)] + [t.x for t in self.targets]
-        ys = [y for u in self.uavs for y in (u.y_s, u.y_c)] + [t.y for t in self.targets]
+        stops: tuple[Target | Base, ...] = (*self.targets, *self.bases)
+        xs = [x for u in self.uavs for x in (u.x_s, u.x_c)] + [stop.x for stop in stops]
+        ys = [y for u in self.uavs for y in (u.y_s, u.y_c)] + [stop.y for stop in stops]
         on_globe = self.crs == "wgs84"
         west, east = longitude_stretch(xs) if on_globe else (min(xs), max(xs))
         diagonal = distance(self.crs, west, min(ys), east, max(ys))

@@ -62,9 +62,16 @@ def _materials(problem: Problem) -> Rules:
     for i, uav in enumerate(problem.uavs):
         if uav.capacity is None:
             continue
-        weight = sum(each * amount for each, amount in zip(weights, uav.loadlist, strict=False))
+        most = map(max, uav.loadlist, uav.full)
+        weight = sum(each * amount for each, amount in zip(weights, most, strict=False))
         if weight > uav.capacity * (1.0 + ROUNDING_OF_WEIGHT):
-            detail = f"{written(uav.capacity)} is less than the {written(weight)} that its `loadlist` weighs"
+            of = (
+                "`loadlist`"
+                if uav.full == uav.loadlist
+                else "`loadlist` and `full_load`, the larger of each,"
+            )
+            weighs = "weighs" if uav.full == uav.loadlist else "weigh"
+            detail = f"{written(uav.capacity)} is less than the {written(weight)} that its {of} {weighs}"
             yield f"/uavs/{i}/capacity", detail
 
 
@@ -81,7 +88,7 @@ def _ids(problem: Problem) -> Rules:
                 continue
             known = {item.id for item in getattr(problem, each.kind.ids_of)}
             for index, ids in enumerate(ids_of_items):
-                for place, identifier in enumerate(ids):
+                for place, identifier in enumerate(ids or ()):
                     if identifier not in known:
                         detail = f"{identifier!r} is no id of the {each.kind.ids_of}"
                         yield f"/{name}/{index}/{each.name}/{place}", detail
@@ -104,7 +111,8 @@ def _promises(problem: Problem) -> Rules:
 
 def _start_plan(problem: Problem) -> Rules:
     """Yield where the plan has not the shape of one; what it may do the simulator says."""
-    plan, m, n = problem.start_plan, len(problem.uavs), len(problem.targets)
+    plan, m = problem.start_plan, len(problem.uavs)
+    last = len(problem.targets) + len(problem.bases)
     if plan is None:
         return
     if not 1 <= len(plan) <= problem.max_steps:
@@ -114,5 +122,5 @@ def _start_plan(problem: Problem) -> Rules:
             yield f"/start_plan/{step}", f"{len(row)} actions, but there are {m} UAVs"
             continue
         for i, action in enumerate(row):
-            if not 0 <= action <= n:
-                yield f"/start_plan/{step}/{i}", f"{action} is not in 0..{n}"
+            if not 0 <= action <= last:
+                yield f"/start_plan/{step}/{i}", f"{action} is not in 0..{last}"

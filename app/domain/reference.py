@@ -25,13 +25,13 @@ from app.domain.fields import (
 )
 from app.domain.matrices import Matrix
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.domain.surroundings import Material, NoFlyZone, Wind
+from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 from app.domain.world_fields import FEWEST_CORNERS, Corners, Table
 
 PAGE = Path(__file__).with_name("README.md")
 
 _DECLARED: dict[str, type] = {
-    each.__name__: each for each in (UAV, Target, Problem, Objective, Material, NoFlyZone, Wind, Matrix)
+    each.__name__: each for each in (UAV, Target, Problem, Objective, Material, Base, NoFlyZone, Wind, Matrix)
 }
 _HEAD = ("field", "meaning", "unit", "limits", "default")
 _TABLE = re.compile(r"(?<=<!-- fields of )(\w+)( -->\n).*?(?=<!-- end of fields -->)", re.DOTALL)

@@ -1,13 +1,13 @@
-"""What surrounds a swarm and its areas: kinds of material, no-fly zones, wind."""
+"""What surrounds a swarm and its areas: kinds of material, bases, no-fly zones, wind."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from app.domain.fields import Identifier, Number
+from app.domain.fields import Amounts, Coordinate, Identifier, Number, Whole
 from app.domain.text_fields import Name, Properties
-from app.domain.units import SPEED
+from app.domain.units import SPEED, TIME, X, Y
 from app.domain.world_fields import Corners
 
 
@@ -21,6 +21,34 @@ class Material:
         "Text for people; default: material-1, material-2, … by place in the list",
     ]
     weight: Annotated[float, Number(low=0.0), "Weight of one unit"] = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """A place where UAVs land, reload, and take off again."""
+
+    id: Annotated[
+        str,
+        Identifier(stem="base"),
+        "Unique among the bases; default: base-1, base-2, … by place in the list",
+    ]
+    x: Annotated[float, Coordinate(axis=X), f"Position: {X}"]
+    y: Annotated[float, Coordinate(axis=Y), f"Position: {Y}"]
+    stock: Annotated[
+        tuple[float, ...] | None,
+        Amounts(),
+        "Amounts in stock, one a material; default: as much as is asked for",
+    ] = None
+    turnaround: Annotated[float, Number(low=0.0, unit=TIME), "Time from landing until it takes off again"] = (
+        0.0
+    )
+    location: Annotated[int | None, Whole(0), "Where it is, as a row of the `matrices`; needed with them"] = (
+        None
+    )
+    name: Annotated[str | None, Name(), "Text for people, which need not be unique; default: the id"] = None
+    properties: Annotated[
+        dict[str, Any] | None, Properties(), "An object that is kept and given back unread, at most 4 KB"
+    ] = field(default=None, hash=False)
 
 
 @dataclass(frozen=True, slots=True)

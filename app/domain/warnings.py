@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import EARTH_RADIUS_KM, distances, unrolled
-from app.domain.problem import TOLERANCE, Problem
+from app.domain.problem import TOLERANCE, UAV, Problem
 from app.domain.time_warnings import odd_times
 
 Floats = npt.NDArray[np.float64]
@@ -106,10 +106,10 @@ class _Scene(NamedTuple):
     ready: Flags  # (M,) not returning
     wanted: Flags  # (N,) needs anything
     left: Floats  # (M,) range left, with the tolerance of the rules
-    load: Floats  # (M, K)
+    load: Floats  # (M, K) the larger of what it carries and what it can load
     need: Floats  # (N, K)
     near_uav: Floats  # (M,) distance to the nearest wanted target, roughly
-    near_target: Floats  # (N,) distance to the nearest ready UAV, roughly
+    near_target: Floats  # (N,) distance to the nearest ready UAV, or base, roughly
 
 
 def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
@@ -135,9 +135,9 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
     found += swapped or _far_points(scene, places)
     if problem.crs == "local":
         found += _degrees(scene, places)
-    # With a wind behind it a UAV gets farther than its range.
-    still = problem.wind is None or not problem.wind.speed
-    if still and scene.ready.any() and scene.wanted.any() and not _anyone_in_range(scene):
+    # With a wind behind it a UAV gets farther than its range, and with bases on the way.
+    plain = not problem.bases and (problem.wind is None or not problem.wind.speed)
+    if plain and scene.ready.any() and scene.wanted.any() and not _anyone_in_range(scene):
         says = "no UAV that can be sent has the range for any target that needs anything"
         found.append(ProblemWarning("/uavs", "none_in_range", says + _and_back(problem)))
     return tuple(found)
@@ -146,7 +146,20 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
 def _scene(problem: Problem) -> _Scene:
     uavs, targets = problem.uavs, problem.targets
     of_uavs = np.array(
-        [(u.x_s, u.y_s, u.x_c, u.y_c, u.voyage, u.dis, u.ret, *u.loadlist) for u in uavs], dtype=np.float64
+        [
+            (
+                u.x_s,
+                u.y_s,
+                u.x_c,
+                u.y_c,
+                u.voyage,
+                u.dis,
+                u.ret,
+                *(map(max, u.loadlist, _loads_later(problem, u))),
+            )
+            for u in uavs
+        ],
+        dtype=np.float64,
     )
     area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
     need = np.array([t.need for t in targets], dtype=np.float64)
@@ -154,10 +167,23 @@ def _scene(problem: Problem) -> _Scene:
     wanted: Flags = need.max(axis=1) > 0.0
     left = of_uavs[:, 4] * (1.0 + TOLERANCE) - of_uavs[:, 5]
     near_uav, near_target = _nearest(problem.crs, of_uavs[:, 2:4], area, ready, wanted)
+    if problem.bases:
+        bases = np.array([(base.x, base.y) for base in problem.bases], dtype=np.float64)
+        _, near_base = _nearest(problem.crs, bases, area, np.ones(len(bases), np.bool_), wanted)
+        near_target = np.minimum(near_target, near_base)
     return _Scene(
         problem, of_uavs[:, 0:2], of_uavs[:, 2:4], area, ready, wanted, left, of_uavs[:, 7:], need, near_uav,
         near_target,
     )  # fmt: skip
+
+
+def _loads_later(problem: Problem, uav: UAV) -> tuple[float, ...]:
+    """Return the amounts that a UAV can take aboard at some base, at most what it leaves one with."""
+    bases = [base for base in problem.bases if uav.bases is None or base.id in uav.bases]
+    return tuple(
+        amount if any(base.stock is None or base.stock[k] > 0.0 for base in bases) else 0.0
+        for k, amount in enumerate(uav.full)
+    )
 
 
 def _nearest(crs: str, a: Floats, b: Floats, of_a: Flags, of_b: Flags) -> tuple[Floats, Floats]:
@@ -218,6 +244,7 @@ def _supplies(scene: _Scene) -> Iterator[ProblemWarning]:
         needing = np.flatnonzero(scene.need[:, k])
         says = (
             f"material {k + 1} is needed by {len(needing)} targets, and no UAV that can be sent carries any"
+            + (", or can load any" if scene.problem.bases else "")
         )
         yield ProblemWarning(f"/targets/{needing[0]}/loadlist/{k}", "not_carried", says)
     for k in np.flatnonzero(~scene.need.any(axis=0) & carried):

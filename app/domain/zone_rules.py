@@ -42,6 +42,7 @@ def broken_rules_of_zones(problem: Problem) -> Rules:
         *((f"/uavs/{i}/x_s", uav.x_s, uav.y_s) for i, uav in enumerate(problem.uavs)),
         *((f"/uavs/{i}/x_c", uav.x_c, uav.y_c) for i, uav in enumerate(problem.uavs)),
         *((f"/targets/{j}/x", target.x, target.y) for j, target in enumerate(problem.targets)),
+        *((f"/bases/{d}/x", base.x, base.y) for d, base in enumerate(problem.bases)),
         *(
             (f"/no_fly_zones/{z}/polygon/{c}", *corner)
             for z, zone in enumerate(zones)

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from app.domain.problem import ROUNDING, Problem
-from app.simulation.columns import AREAS, TERMS, UAVS
+from app.simulation.columns import AREAS, BASES, TERMS, UAVS
+from app.simulation.homes import Homes, nearest_homes, usable_bases
 from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
 
 Floats = npt.NDArray[np.float64]
@@ -36,7 +37,8 @@ class Axes:
     Attributes
     ----------
     names
-        A letter each: M (UAVs), N (targets), C (classes of legs), and X, the last, for what else there is.
+        A letter each: M (UAVs), N (targets), D (bases), L (stops, which are numbered as actions are: N where
+        there are no bases, otherwise N + 1 + D), C (classes of legs), and X, the last, for all else.
     padding
         What a padded UAV or target has.
     """
@@ -54,16 +56,16 @@ class ProblemArrays(NamedTuple):
     Attributes
     ----------
     start_target
-        (P, M, N) length of the leg from a UAV's current position in the request to a target.
+        (P, M, L) length of the leg from a UAV's current position in the request to a target or base.
     between
-        (P, C, N, N) length of the leg from a target to another.
+        (P, C, L, L) length of the leg from a target or base to another.
     home
-        (P, M, N) length of the leg from a target to a UAV's starting point; 0 where there is none.
+        (P, M, L) length of the leg from a target or base to where a UAV lands; 0 where there is none.
     start_time, between_time, home_time
-        (P, M, N), (P, C, N, N), (P, M, N) times of these legs, where they are given.
+        (P, M, L), (P, C, L, L), (P, M, L) times of these legs, where they are given.
     kept_range
-        (P, M, N) air length that has to be left on arrival at a target: that of the way home, where it is
-        required; ``UNREACHABLE`` where the UAV must not be sent there.
+        (P, M, L) air length that has to be left on arrival: that of the way home, where it is required;
+        ``UNREACHABLE`` where the UAV must not be sent there.
     uavs
         (P, M) of :data:`~app.simulation.columns.UAVS`.
     committed, before
@@ -73,6 +75,12 @@ class ProblemArrays(NamedTuple):
         (P, M) UAVs that are returning.
     load
         (P, M, K) amounts carried.
+    full
+        (P, M, K) amounts that it leaves a base with; those carried where there are no bases.
+    bases
+        (P, D) of :data:`~app.simulation.columns.BASES`.
+    stock
+        (P, D, K) amounts at the bases; infinite where there is as much as is asked for.
     areas
         (P, N) of :data:`~app.simulation.columns.AREAS`.
     need
@@ -87,18 +95,21 @@ class ProblemArrays(NamedTuple):
         (P,) S.
     """
 
-    start_target: Annotated[Floats, Axes("MN")]
-    between: Annotated[Floats, Axes("CNN")]
-    home: Annotated[Floats, Axes("MN")]
-    start_time: Annotated[Floats, Axes("MN")]
-    between_time: Annotated[Floats, Axes("CNN")]
-    home_time: Annotated[Floats, Axes("MN")]
-    kept_range: Annotated[Floats, Axes("MN")]
+    start_target: Annotated[Floats, Axes("ML")]
+    between: Annotated[Floats, Axes("CLL")]
+    home: Annotated[Floats, Axes("ML")]
+    start_time: Annotated[Floats, Axes("ML")]
+    between_time: Annotated[Floats, Axes("CLL")]
+    home_time: Annotated[Floats, Axes("ML")]
+    kept_range: Annotated[Floats, Axes("ML")]
     uavs: Annotated[Records, Axes("M", padding=(1.0, *(0.0,) * 8, 0, False, False))]
     committed: Annotated[Integers, Axes("MX", padding=-1)]
     before: Annotated[Integers, Axes("MX", padding=-1)]
     ret: Annotated[Flags, Axes("M", padding=True)]
     load: Annotated[Floats, Axes("MX")]
+    full: Annotated[Floats, Axes("MX")]
+    bases: Annotated[Records, Axes("D", padding=(0.0,))]
+    stock: Annotated[Floats, Axes("DX")]
     areas: Annotated[Records, Axes("N", padding=(0.0, 0.0, 0.0, 0.0, np.inf, 0.0))]
     need: Annotated[Floats, Axes("NX")]
     requested: Annotated[Floats, Axes("NX")]
@@ -112,6 +123,11 @@ class ProblemArrays(NamedTuple):
         _, m, k = self.load.shape
         return m, self.need.shape[1], k
 
+    @property
+    def n_bases(self) -> int:
+        """Number of bases, D; they are not among those that are padded."""
+        return int(self.stock.shape[1])
+
 
 def compile_problem(problem: Problem) -> ProblemArrays:
     """Turn one problem into a stack of one.
@@ -120,16 +136,28 @@ def compile_problem(problem: Problem) -> ProblemArrays:
     when the plan is explained: the newest problem's arrays are kept as long as the problem lives. They are
     for reading; copy it before changing it.
     """
+    return _compiled(problem)[0]
+
+
+def homes_of(problem: Problem) -> Homes | None:
+    """Return where the UAVs of a problem land; None where there are no bases."""
+    return _compiled(problem)[1]
+
+
+_Compiled = tuple[ProblemArrays, Homes | None]
+
+
+def _compiled(problem: Problem) -> _Compiled:
     global _newest  # noqa: PLW0603 - one entry, replaced as a whole
     known = _newest
     if known is not None and known[0]() is problem:
         return known[1]
-    arrays = _compile(problem)
-    _newest = weakref.ref(problem, _forget), arrays
-    return arrays
+    compiled = _compile(problem)
+    _newest = weakref.ref(problem, _forget), compiled
+    return compiled
 
 
-_newest: tuple[weakref.ref[Problem], ProblemArrays] | None = None
+_newest: tuple[weakref.ref[Problem], _Compiled] | None = None
 
 
 def _forget(gone: weakref.ref[Problem]) -> None:
@@ -138,26 +166,31 @@ def _forget(gone: weakref.ref[Problem]) -> None:
         _newest = None
 
 
-def _compile(problem: Problem) -> ProblemArrays:
+def _compile(problem: Problem) -> _Compiled:
     uavs, targets, objective = problem.uavs, problem.targets, problem.objective
     need = np.array([t.need for t in targets], dtype=np.float64)
     load = np.array([u.loadlist for u in uavs], dtype=np.float64)
+    full = np.array([u.full for u in uavs], dtype=np.float64) if problem.bases else load
+    unlimited = (np.inf,) * problem.n_materials
+    stock = np.array([unlimited if base.stock is None else base.stock for base in problem.bases], np.float64)
     requested = np.array(
         [t.loadlist if t.requested is None else t.requested for t in targets], dtype=np.float64
     )
     share = objective.minimum_share if objective.minimum_weight > 1.0 else 0.0
     bonus = objective.minimum_weight - 1.0 if share > 0.0 else 0.0
     beyond = (1.0 - share) * requested
-    legs = leg_arrays(problem)
+    legs, homes = leg_arrays(problem), None
+    if problem.bases:
+        legs, homes = nearest_homes(problem, legs)
     index = {target.id: j for j, target in enumerate(targets)}
     terms = np.zeros(1, TERMS)
     terms["weight"], terms["makespan"] = problem.distance_weight, objective.makespan_weight
     terms["change"], terms["bonus"] = objective.change_weight, bonus
     terms["decay"] = 0.0 if objective.half_life is None else 1.0 / objective.half_life
-    terms["crumb"] = ROUNDING * max(load.max(), requested.max())
+    terms["crumb"] = ROUNDING * max(load.max(), full.max(), requested.max())
     terms["return_to_base"], terms["charge_return"] = objective.return_to_base, objective.charge_return
     terms["timed"], terms["in_wind"], terms["metric"] = legs.timed, legs.in_wind, legs.metric
-    return ProblemArrays(
+    arrays = ProblemArrays(
         start_target=legs.start_target[None],
         between=legs.between[None],
         home=legs.home[None],
@@ -170,6 +203,9 @@ def _compile(problem: Problem) -> ProblemArrays:
         before=_listed(_visited_before(problem))[None],
         ret=np.array([[u.ret for u in uavs]], dtype=np.bool_),
         load=load[None],
+        full=full[None],
+        bases=np.array([(base.turnaround,) for base in problem.bases], BASES)[None],
+        stock=stock.reshape(1, problem.n_bases, problem.n_materials),
         areas=_areas(problem, need, beyond, bonus)[None],
         need=need[None],
         requested=requested[None],
@@ -177,6 +213,7 @@ def _compile(problem: Problem) -> ProblemArrays:
         terms=terms,
         max_steps=np.array([problem.max_steps], dtype=np.int64),
     )
+    return arrays, homes
 
 
 def _uavs(problem: Problem, legs: LegArrays) -> Records:
@@ -213,6 +250,9 @@ def _kept_range(problem: Problem, legs: LegArrays, index: dict[str, int]) -> Flo
     if problem.objective.return_to_base:
         speed = np.array([uav.speed for uav in problem.uavs])[:, None]
         kept[:] = np.where(legs.homeless, UNREACHABLE, legs.home_time * speed if legs.in_wind else legs.home)
+    if problem.bases:
+        kept[:, problem.n_targets] = UNREACHABLE
+        kept[:, problem.n_targets + 1 :] = np.where(usable_bases(problem), 0.0, UNREACHABLE)
     skills = [frozenset(target.skills) for target in problem.targets]
     skilled = np.array([bool(needed) for needed in skills])
     for i, uav in enumerate(problem.uavs):
@@ -263,7 +303,10 @@ def part(arrays: ProblemArrays, uavs: Integers, targets: Integers) -> ProblemArr
     """
     # A part has as many classes of legs as there may be among its UAVs, numbered anew.
     classes, number = _classes_of(arrays.uavs["leg_class"][0][uavs])
-    taken = {"M": uavs, "N": targets, "C": classes}
+    rest = np.arange(arrays.shape[1], arrays.between.shape[2])
+    stops = np.concatenate([targets, np.broadcast_to(rest, (len(targets), len(rest)))], axis=1)
+    bases = np.broadcast_to(np.arange(arrays.n_bases), (len(targets), arrays.n_bases))
+    taken = {"M": uavs, "N": targets, "L": stops, "D": bases, "C": classes}
     columns = {}
     for name, axes in AXES.items():
         column = getattr(arrays, name)
@@ -325,7 +368,14 @@ def stack(problems: Sequence[ProblemArrays]) -> ProblemArrays:
     ----------
     problems
         At least one.
+
+    Raises
+    ------
+    ValueError
+        If there are bases, whose numbers follow those of the targets, and not everywhere as many of both.
     """
+    if len({(each.shape[1], each.n_bases) for each in problems}) > 1 and any(e.n_bases for e in problems):
+        raise ValueError("problems with bases are stacked only with as many targets and bases each")
     columns = zip(ProblemArrays._fields, zip(*problems, strict=True), strict=True)
     return ProblemArrays(**{name: _pad(arrays, AXES[name].padding) for name, arrays in columns})
 

@@ -19,6 +19,7 @@ NAMES = {
     visit.COMMITTED_ELSEWHERE: "committed",
     visit.TOO_LONG_ALOFT: "endurance",
     visit.HOME_TOO_LATE: "available_until",
+    visit.RELOADED: "reloaded",
     visit.UNLOADS_NOTHING: "unloads_nothing",
     visit.NO_SUCH_ACTION: "no_such_action",
     visit.TOO_MANY_STEPS: "max_steps",
@@ -34,8 +35,8 @@ class Breach:
     ----------
     step
         From 1.
-    uav_id, target_id
-        The UAV, and the target that it is sent to; None where there is none.
+    uav_id, target_id, base_id
+        The UAV, and the target or base that it is sent to; None where there is none.
     rule, says
         The rule for programs, and for people.
     needed, had
@@ -49,14 +50,16 @@ class Breach:
     says: str
     needed: float | None = None
     had: float | None = None
+    base_id: str | None = None
 
 
 def breaches_of(problem: Problem, plan: Plan) -> list[Breach]:
     """List the actions of a plan that break a rule of greedy unloading, in the plan's order.
 
-    A visit that is not allowed is left out, and the plan goes on without it.
+    An action that is not allowed is left out, and the plan goes on without it.
     """
     arrays, n = compile_problem(problem), problem.n_targets
+    last = n + problem.n_bases
     episodes, figures, found = simulator.new_episodes(arrays, 1), np.zeros(2), []
     for s, row in enumerate(plan.assignment):
         if s >= problem.max_steps:
@@ -64,7 +67,7 @@ def breaches_of(problem: Problem, plan: Plan) -> list[Breach]:
             found.append(_breach(problem, s, None, None, visit.TOO_MANY_STEPS, needed, had))
             break
         for i, action in enumerate(row):
-            if not 0 <= action <= n:
+            if not 0 <= action <= last:
                 found.append(_breach(problem, s, i, None, visit.NO_SUCH_ACTION))
                 continue
             rule = visit.ALLOWED if action == n else int(simulator.verdict(arrays, episodes, 0, i, action))
@@ -88,7 +91,9 @@ def _breach(
     had: float | None = None,
 ) -> Breach:
     uav = None if i is None else problem.uavs[i]
-    target = None if j is None else problem.targets[j]
+    n = problem.n_targets
+    target = None if j is None or j > n else problem.targets[j]
+    base = None if j is None or j < n else problem.bases[j - n - 1]
     says = visit.RULES[rule]
     if rule == visit.BARRED and uav is not None and target is not None:
         lacked = sorted(set(target.skills) - set(uav.skills))
@@ -98,8 +103,11 @@ def _breach(
             says = f"{uav.id} lacks {', '.join(lacked)}"
         else:
             says = "no way leads there, or home from there"
-    uav_id, target_id = None if uav is None else uav.id, None if target is None else target.id
-    return Breach(s + 1, uav_id, target_id, NAMES[rule], says, needed, had)
+    if rule == visit.BARRED and uav is not None and base is not None:
+        allowed = uav.bases is None or base.id in uav.bases
+        says = "no way leads there" if allowed else f"{uav.id} may not use {base.id}"
+    uav_id, target_id, base_id = (None if each is None else each.id for each in (uav, target, base))
+    return Breach(s + 1, uav_id, target_id, NAMES[rule], says, needed, had, base_id)
 
 
 @simulator.compiled
@@ -111,7 +119,6 @@ def _measure(
     time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, length)
     clock = episodes.clock[0, i]
     end = visit.departure_after(arrays, 0, j, clock + time)
-    first = episodes.visits[0, i] == 0
     if rule == visit.OUT_OF_RANGE:
         flown = episodes.flown[0, i] + visit.air_length(arrays, 0, i, length, time)
         figures[0] = visit.flown_with_return(arrays, 0, i, j, flown)
@@ -119,7 +126,9 @@ def _measure(
     elif rule == visit.TOO_LATE:
         figures[0], figures[1] = clock + time, arrays.areas[0, j].deadline
     elif rule == visit.TOO_LONG_ALOFT:
-        aloft = visit.aloft_after(arrays, 0, i, first, episodes.aloft[0, i], clock, clock + time, end, j)
+        aloft = visit.aloft_after(
+            arrays, 0, i, episodes.at[0, i], episodes.aloft[0, i], clock, clock + time, end, j
+        )
         figures[0] = aloft + visit.time_home(arrays, 0, i, j)
         figures[1] = arrays.uavs[0, i].endurance
     elif rule == visit.HOME_TOO_LATE:

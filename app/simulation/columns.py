@@ -83,6 +83,9 @@ on_ground
     Whether it waits for its first visit on the ground.
 """
 
+BASES = np.dtype([("turnaround", "f8")], align=True)
+"""What a base has: the time from landing until a UAV takes off again."""
+
 AREAS = np.dtype(
     [
         ("level", "f8"),

@@ -17,18 +17,18 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.simulator import compiled
-from app.simulation.visit import worths
+from app.simulation.worth import worths
 
 
 class Visits(NamedTuple):
-    """Which UAV visits which target. Visit number s of UAV i is ``slot = s * M + i``.
+    """Which UAV stops at which target or base. Stop number s of UAV i is ``slot = s * M + i``.
 
     Attributes
     ----------
     target, length
-        (M, S) targets in order and (M,) visits of each route.
+        (M, S) targets and bases in order, numbered as actions are, and (M,) stops of each route.
     first, following
-        (N,) and (S*M,): the visits of each target in order, as a linked list of slots.
+        (L,) and (S*M,): the stops at each target and base in order, as a linked list of slots.
     """
 
     target: Integers
@@ -112,10 +112,10 @@ def visits_of(arrays: ProblemArrays, actions: Integers) -> Visits:
     visits = Visits(
         np.zeros((m, steps), np.int64),
         np.zeros(m, np.int64),
-        np.full(n, NONE, np.int64),
+        np.full(arrays.between.shape[2], NONE, np.int64),
         np.full(steps * m, NONE, np.int64),
     )
-    _connect(actions, visits)
+    _connect(actions, visits, n)
     return visits
 
 
@@ -147,12 +147,12 @@ def best_deliveries(arrays: ProblemArrays, actions: Integers) -> Floats:
 
 
 @compiled
-def _connect(actions: Integers, visits: Visits) -> None:
-    """Write routes and, from the last visit to the first, the lists of the targets."""
-    n, m = visits.first.shape[0], actions.shape[1]
+def _connect(actions: Integers, visits: Visits, home: int) -> None:
+    """Write routes and, from the last stop to the first, the lists of targets and bases."""
+    m = actions.shape[1]
     for s in range(actions.shape[0]):
         for i in range(m):
-            if actions[s, i] < n:
+            if actions[s, i] != home:
                 visits.target[i, visits.length[i]] = actions[s, i]
                 visits.length[i] += 1
     for s in range(actions.shape[0] - 1, -1, -1):

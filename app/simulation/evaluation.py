@@ -48,7 +48,7 @@ def replayed(
     IllegalPlan
         If one of its actions is not allowed; ``details`` has step (from 1), uav_id and rule.
     """
-    if problem.objective.unloading == "greedy":
+    if not problem.plans_unloading:
         result, delivered = rewards_of(arrays, actions[None]), None
     else:
         # Rows and actions are looked at here already, as the deliveries are worked out before the replay.

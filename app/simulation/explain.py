@@ -10,20 +10,27 @@ import numpy as np
 
 from app.domain.allocation import (
     Allocation,
+    BaseLeft,
     Landing,
     LandingRoute,
+    LandingSomewhere,
+    Path,
+    Reload,
     Route,
+    SortieAllocation,
     Stop,
     TimedAllocation,
     TimedStop,
+    Visit,
 )
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.domain.world_use import uses_world
 from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
-from app.simulation.arrays import Floats, ProblemArrays, compile_problem
+from app.simulation.arrays import Floats, ProblemArrays, compile_problem, homes_of
 from app.simulation.evaluation import replayed
+from app.simulation.homes import AT_START
 from app.simulation.replay import Replay, deliver
 from app.simulation.unmet import unmet_targets
 from app.simulation.ways import Ways
@@ -33,7 +40,8 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     """Replay a plan and write down everything that follows from it.
 
     The answer is a :class:`~app.domain.allocation.TimedAllocation` where the problem uses anything of the
-    world (:func:`~app.domain.world_use.uses_world`).
+    world (:func:`~app.domain.world_use.uses_world`), and a :class:`~app.domain.allocation.SortieAllocation`
+    where it has bases.
 
     With planned unloading the deliveries are the best ones for the plan's routes.
 
@@ -65,9 +73,14 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     )
     if not world:
         return allocation
-    return TimedAllocation(
+    timed = TimedAllocation(
         **_values(allocation), makespan=float(result.makespan[0]), changes=_changes(problem, actions)
     )
+    if not problem.bases:
+        return timed
+    left = zip(problem.bases, episodes.stock[0].tolist(), strict=True)
+    bases = (BaseLeft(base.id, None if base.stock is None else tuple(stock)) for base, stock in left)
+    return SortieAllocation(**_values(timed), bases=tuple(bases))
 
 
 def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
@@ -95,11 +108,12 @@ def _traced(
     episodes = simulator.new_episodes(arrays, 1)
     trace = _new_trace(actions, problem.n_materials, given)
     _trace(arrays, episodes, actions, given is not None, trace)
-    tidy(arrays, actions, trace.delivered, episodes.need[0])
+    tidy(arrays, actions, trace.delivered, trace.loaded, episodes.need[0], episodes.stock[0])
     return result, trace, episodes
 
 
 def _routes(problem: Problem, actions: Actions, trace: Trace) -> Iterator[Route]:
+    """Return routes of a problem without a world."""
     for i, uav in enumerate(problem.uavs):
         stops = tuple(_stop(problem, actions, trace, s, i) for s in _steps(problem, actions, i))
         back = 0.0 if uav.ret else float(trace.return_legs[i])
@@ -117,7 +131,7 @@ def _stop(problem: Problem, actions: Actions, trace: Trace, s: int, i: int) -> S
 
 
 def _steps(problem: Problem, actions: Actions, i: int) -> list[int]:
-    """Return the steps, from 0, in which UAV `i` visits something."""
+    """Return the steps, from 0, in which UAV `i` visits something, or reloads."""
     steps: list[int] = np.flatnonzero(actions[:, i] != problem.n_targets).tolist()
     return steps
 
@@ -125,34 +139,61 @@ def _steps(problem: Problem, actions: Actions, i: int) -> list[int]:
 def _timed_routes(
     problem: Problem, actions: Actions, trace: Trace, episodes: simulator.Episodes
 ) -> Iterator[LandingRoute]:
-    ways = Ways(problem)
-    for i, (uav, route) in enumerate(zip(problem.uavs, _routes(problem, actions, trace), strict=True)):
-        at, stops = visit.START, []
-        for s, stop in zip(_steps(problem, actions, i), route.stops, strict=True):
-            aloft = float(trace.aloft[s, i])
-            timed = TimedStop(
-                **_values(stop),
-                begin_time=float(trace.begins[s, i]),
-                departure_time=float(trace.departures[s, i]),
-                range_left=uav.voyage - float(trace.flown[s, i]),
-                endurance_left=None if uav.endurance is None else uav.endurance - aloft,
-                path=ways.to(i, at, int(actions[s, i]), stop.distance),
-            )
+    ways, homes = Ways(problem), homes_of(problem)
+    for i, uav in enumerate(problem.uavs):
+        at = visit.START
+        stops: list[TimedStop | Reload] = []
+        for s in _steps(problem, actions, i):
+            path = ways.to(i, at, int(actions[s, i]), float(trace.legs[s, i]))
             at = int(actions[s, i])
-            stops.append(timed)
+            if at > problem.n_targets:
+                stops.append(_reload(problem, trace, s, i, at, path))
+                continue
+            aloft = float(trace.aloft[s, i])
+            stops.append(
+                (Visit if problem.bases else TimedStop)(
+                    **_values(_stop(problem, actions, trace, s, i)),
+                    begin_time=float(trace.begins[s, i]),
+                    departure_time=float(trace.departures[s, i]),
+                    range_left=uav.voyage - float(trace.flown[s, i]),
+                    endurance_left=None if uav.endurance is None else uav.endurance - aloft,
+                    path=path,
+                )
+            )
+        back = 0.0 if uav.ret else float(trace.return_legs[i])
         landing = None
         if not problem.objective.return_to_base:
-            landing = Landing(stops[-1].departure_time, None) if stops else None
-        elif stops or route.return_distance > 0.0:
-            time = float(episodes.clock[0, i] + trace.return_times[i])
-            landing = Landing(time, ways.home(i, at, route.return_distance))
-        yield LandingRoute(**{**_values(route), "stops": tuple(stops)}, landing=landing)
+            landing = _landing(problem, stops[-1].departure_time, None, AT_START) if stops else None
+        elif stops or back > 0.0:
+            time, base = float(episodes.clock[0, i] + trace.return_times[i]), AT_START
+            if homes is not None:
+                base = int(homes.from_now[i] if at == visit.START else homes.from_stop[i, at])
+            landing = _landing(problem, time, ways.home(i, at, base, back), base)
+        yield LandingRoute(uav.id, sum(stop.distance for stop in stops), back, tuple(stops), landing)
+
+
+def _reload(problem: Problem, trace: Trace, s: int, i: int, at: int, path: Path | None) -> Reload:
+    return Reload(
+        base_id=problem.bases[at - problem.n_targets - 1].id,
+        step=s + 1,
+        arrival_time=float(trace.arrivals[s, i]),
+        distance=float(trace.legs[s, i]),
+        loaded=tuple(trace.loaded[s, i].tolist()),
+        departure_time=float(trace.departures[s, i]),
+        path=path,
+    )
+
+
+def _landing(problem: Problem, time: float, path: Path | None, base: int) -> Landing:
+    if not problem.bases:
+        return Landing(time, path)
+    return LandingSomewhere(time, path, None if base == AT_START else problem.bases[base].id)
 
 
 def _changes(problem: Problem, actions: Actions) -> int:
     """Count pairs of UAV and target that are visited in ``start_plan`` and not here (section 10)."""
     before, now = (
-        {(i, j) for row in rows for i, j in enumerate(row) if j != problem.n_targets}
+        {(i, j) for row in rows for i, j in enumerate(row) if j < problem.n_targets}
         for rows in (problem.start_plan or (), actions.tolist())
     )
     return len(before - now)
@@ -164,7 +205,7 @@ def _values(of: Any) -> dict[str, Any]:
 
 
 class Trace(NamedTuple):
-    """What a plan does, by step and UAV, (S', M) where nothing else is said.
+    """What a plan does, by step and UAV, (S', M) where nothing else is said; reloads have no begin.
 
     Attributes
     ----------
@@ -172,8 +213,8 @@ class Trace(NamedTuple):
         Length of the leg of each visit, when the UAV is there, when it begins, and when it has ended.
     flown, aloft
         Air length, and time in the air, at its end; the latter of UAVs for which it counts.
-    delivered
-        (S', M, K) what it unloads.
+    delivered, loaded
+        (S', M, K) what it unloads, or takes up.
     return_legs, return_times
         (M,) length of the leg home after the last visit, and time until landing.
     """
@@ -185,6 +226,7 @@ class Trace(NamedTuple):
     flown: Floats
     aloft: Floats
     delivered: Floats
+    loaded: Floats
     return_legs: Floats
     return_times: Floats
 
@@ -200,6 +242,7 @@ def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> 
         flown=np.zeros(shape),
         aloft=np.zeros(shape),
         delivered=np.zeros((*shape, n_materials)) if delivered is None else delivered,
+        loaded=np.zeros((*shape, n_materials)),
         return_legs=np.zeros(m),
         return_times=np.zeros(m),
     )
@@ -209,7 +252,7 @@ def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> 
 def _trace(
     arrays: ProblemArrays, episodes: simulator.Episodes, actions: Actions, planned: bool, trace: Trace
 ) -> None:
-    """Fly the visits of a legal plan, and write down what each does, then the legs home.
+    """Fly the stops of a legal plan, and write down what each does, then the legs home.
 
     Deliveries are written down too, unless they are planned: then the trace has them.
     """
@@ -221,6 +264,16 @@ def _trace(
             length = simulator.leg_to(arrays, episodes, 0, i, j)
             time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, length)
             trace.legs[s, i], trace.arrivals[s, i] = length, episodes.clock[0, i] + time
+            if visit.is_base(arrays, j):
+                for k in range(trace.loaded.shape[2]):
+                    trace.loaded[s, i, k] = visit.loaded_of(
+                        episodes.load[0, i, k],
+                        arrays.full[0, i, k],
+                        episodes.stock[0, j - arrays.need.shape[1] - 1, k],
+                    )
+                simulator.act(arrays, episodes, 0, i, j)
+                trace.departures[s, i] = episodes.clock[0, i]
+                continue
             trace.begins[s, i] = visit.begin_after(arrays, 0, j, trace.arrivals[s, i])
             if planned:
                 deliver(arrays, episodes, i, j, trace.delivered, s)

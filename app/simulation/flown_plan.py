@@ -10,6 +10,7 @@ from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.deliveries import Visits, visits_of
 from app.simulation.replay import deliver
+from app.simulation.visit import is_base
 
 
 class FlownPlan(NamedTuple):
@@ -20,20 +21,22 @@ class FlownPlan(NamedTuple):
     visits
         Its routes. They have room for one visit more.
     flown, clock, aloft
-        (M, L+1) air length, time and time in the air before each visit, the last entry of a route after its
-        last visit; the time in the air of UAVs for which it counts.
+        (M, L+1) air length, time and time in the air before each stop, the last entry of a route after its
+        last one; the time in the air of UAVs for which it counts.
     load
         (M, L+1, K) what is aboard then.
     need
-        (M, L+1, K) what the visit's target needs then.
+        (M, L+1, K) what the stop's target needs, or its base has, then.
     value, leg
-        (M, L+1) what each visit earns after its distance is charged, and the length of its leg.
+        (M, L+1) what each stop earns after its distance is charged, and the length of its leg.
     back
         (M,) legs home.
     remaining
         (N, K) what is still needed at the end.
     spare
         (M, K) what is aboard at the end.
+    stock
+        (D, K) what is at the bases at the end.
     """
 
     visits: Visits
@@ -47,6 +50,7 @@ class FlownPlan(NamedTuple):
     back: Floats
     remaining: Floats
     spare: Floats
+    stock: Floats
 
 
 def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, planned: bool) -> FlownPlan:
@@ -62,7 +66,7 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
         Whether these amounts are to be unloaded, not the simulator's own.
     """
     m, n, k = arrays.shape
-    steps = int((actions < n).sum(axis=0).max()) + 1
+    steps = int((actions != n).sum(axis=0).max()) + 1
     visits = visits_of(arrays._replace(max_steps=np.array([steps])), actions)
     episodes = simulator.new_episodes(arrays, 1)
     plan = FlownPlan(
@@ -77,6 +81,7 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
         np.zeros(m),
         episodes.need[0],
         episodes.load[0],
+        episodes.stock[0],
     )
     _fly(arrays, episodes, plan, delivered, planned)
     return plan
@@ -100,7 +105,10 @@ def _fly(
                 continue
             j = visits.target[i, s]
             for k in range(materials):
-                plan.need[i, s, k] = episodes.need[0, j, k]
+                if is_base(arrays, j):
+                    plan.need[i, s, k] = episodes.stock[0, j - arrays.need.shape[1] - 1, k]
+                else:
+                    plan.need[i, s, k] = episodes.need[0, j, k]
             plan.leg[i, s] = simulator.leg_to(arrays, episodes, 0, i, j)
             if planned:
                 before = episodes.satisfaction[0]

@@ -11,9 +11,14 @@ from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.visit import inlined
 
+_NOWHERE = -2
+"""In place of where a flight begins: there is no such place."""
+
 
 class Start(NamedTuple):
     """Which UAV could come to each target from where the request has the swarm; NONE where none could.
+
+    A flight begins where a UAV is, or at a base that it flies to directly.
 
     Attributes
     ----------
@@ -73,7 +78,7 @@ def _measure(arrays: ProblemArrays, i: int, j: int, found: Floats) -> None:
     length = visit.leg(arrays, 0, i, visit.START, j)
     arrival = clock + visit.leg_time(arrays, 0, i, visit.START, j, length)
     end = visit.departure_after(arrays, 0, j, arrival)
-    aloft = visit.aloft_after(arrays, 0, i, True, visit.airborne(arrays, 0, i), clock, arrival, end, j)
+    aloft = visit.aloft_after(arrays, 0, i, visit.START, visit.airborne(arrays, 0, i), clock, arrival, end, j)
     back = visit.time_home(arrays, 0, i, j)
     on_ground = end - clock + visit.airborne(arrays, 0, i) - aloft
     found[0], found[2] = aloft + back, end + back
@@ -82,18 +87,78 @@ def _measure(arrays: ProblemArrays, i: int, j: int, found: Floats) -> None:
 
 @inlined
 def carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
-    """Whether a UAV can be sent and carries, at first, something that a target still needs at the end."""
+    """Whether a UAV can be sent and carries, now or from a base, something that a target needs at the end."""
     useful = False
     for k in range(plan.remaining.shape[1]):
-        useful = useful or visit.can_unload(arrays.load[0, i, k], plan.remaining[j, k])
+        useful = useful or visit.can_unload(visit.most_ever(arrays, 0, i, k), plan.remaining[j, k])
     return bool(useful and not arrays.ret[0, i])
 
 
 @simulator.compiled
-def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
-    """Rule that a UAV's flight from its start to a target breaks, whatever it unloads and is committed to."""
+def is_carried(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
+    """As :func:`carries`, to be called from Python."""
+    return carries(arrays, plan, i, j)
+
+
+@simulator.compiled
+def _rule_from(arrays: ProblemArrays, i: int, at: int, j: int) -> int:
+    """Rule that a flight to a target breaks that begins at the start, or at a base flown to directly."""
     flown, clock, aloft = arrays.uavs[0, i].dis, visit.ready(arrays, 0, i), visit.airborne(arrays, 0, i)
-    return visit.reach_rule(arrays, 0, i, visit.START, j, visit.FREE, flown, clock, aloft)
+    if at != visit.START:
+        flown, clock, aloft = 0.0, _ready_at(arrays, i, at), 0.0
+    return visit.reach_rule(arrays, 0, i, at, j, visit.FREE, flown, clock, aloft)
+
+
+@inlined
+def _ready_at(arrays: ProblemArrays, i: int, at: int) -> float:
+    """Clock at which a UAV can set out from its start, or from a base that it has flown to directly."""
+    clock = visit.ready(arrays, 0, i)
+    if at != visit.START:
+        length = visit.leg(arrays, 0, i, visit.START, at)
+        arrival = clock + visit.leg_time(arrays, 0, i, visit.START, at, length)
+        clock = visit.departure_after(arrays, 0, at, arrival)
+    return clock
+
+
+@inlined
+def _origin(arrays: ProblemArrays, i: int, d: int) -> int:
+    """Where a flight can begin: number 0 is the start, the others are bases; ``_NOWHERE`` where none can."""
+    at = visit.START
+    if d > 0:
+        at = arrays.need.shape[1] + d
+        if visit.is_barred(arrays, 0, i, visit.START, at):
+            at = _NOWHERE
+    return at
+
+
+@inlined
+def _progress(rule: int) -> int:
+    """How far a flight that breaks a rule could get: rules in the order in which reasons are given."""
+    if rule == visit.ALLOWED:
+        far = 4
+    elif rule == visit.BARRED:
+        far = 0
+    elif rule == visit.OUT_OF_RANGE:
+        far = 1
+    else:
+        far = 2 if rule == visit.TOO_LATE else 3
+    return far
+
+
+@simulator.compiled
+def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
+    """Rule that a UAV's direct flight to a target breaks, whatever it unloads and is committed to.
+
+    It begins at its start, or at a base that it has flown to directly; the one that gets farthest counts.
+    """
+    rule = _rule_from(arrays, i, visit.START, j)
+    for d in range(1, arrays.stock.shape[1] + 1):
+        at = _origin(arrays, i, d)
+        if at != _NOWHERE:
+            other = _rule_from(arrays, i, at, j)
+            if _progress(other) > _progress(rule):
+                rule = other
+    return rule
 
 
 @simulator.compiled
@@ -104,16 +169,21 @@ def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, 
             j = targets[q]
             if not carries(arrays, plan, i, j):
                 continue
-            length = visit.leg(arrays, 0, i, visit.START, j)
-            time = visit.leg_time(arrays, 0, i, visit.START, j, length)
-            flown = arrays.uavs[0, i].dis + visit.air_length(arrays, 0, i, length, time)
-            missing = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.uavs[0, i].voyage
-            if missing < start.missing[j]:
-                start.missing[j], start.carrier[j] = missing, i
-            rule = direct_rule(arrays, i, j)
-            if rule not in (visit.BARRED, visit.OUT_OF_RANGE):
-                arrival = visit.ready(arrays, 0, i) + time
-                if arrival < start.arrival[j]:
-                    start.arrival[j], start.fastest[j] = arrival, i
-            if rule == visit.ALLOWED and start.able[j] < 0:
-                start.able[j] = i
+            for d in range(arrays.stock.shape[1] + 1):
+                at = _origin(arrays, i, d)
+                if at == _NOWHERE:
+                    continue
+                length = visit.leg(arrays, 0, i, at, j)
+                time = visit.leg_time(arrays, 0, i, at, j, length)
+                flown = arrays.uavs[0, i].dis if at == visit.START else 0.0
+                flown += visit.air_length(arrays, 0, i, length, time)
+                missing = visit.flown_with_return(arrays, 0, i, j, flown) - arrays.uavs[0, i].voyage
+                if missing < start.missing[j]:
+                    start.missing[j], start.carrier[j] = missing, i
+                rule = _rule_from(arrays, i, at, j)
+                if rule not in (visit.BARRED, visit.OUT_OF_RANGE):
+                    arrival = _ready_at(arrays, i, at) + time
+                    if arrival < start.arrival[j]:
+                        start.arrival[j], start.fastest[j] = arrival, i
+                if rule == visit.ALLOWED and start.able[j] < 0:
+                    start.able[j] = i

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import ROUNDING
-from app.simulation import simulator, visit
+from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
+from app.simulation.heap import pop, push
 from app.simulation.visit import inlined
 
 MARK, QUEUED, CHANGED, WORK, MADE, HELPS = range(6)
@@ -36,7 +37,7 @@ class Trial(NamedTuple):
     episodes
         One episode; of it are valid the UAVs and targets that carry the current mark.
     uav_mark, target_mark
-        (M,) and (N,) the number of the trial that last changed them.
+        (M,) and (L,) the number of the trial that last changed them; L are targets and bases.
     cursor
         (M,) the next visit of a changed UAV in its route.
     changed
@@ -67,12 +68,12 @@ class Trial(NamedTuple):
 
 def new_trial(arrays: ProblemArrays, plan: FlownPlan) -> Trial:
     """Make the scratch space for trials of a plan."""
-    m, n, _ = arrays.shape
+    m = arrays.shape[0]
     slots = plan.leg.size
     return Trial(
         simulator.new_episodes(arrays, 1),
         np.zeros(m, np.int64),
-        np.zeros(n, np.int64),
+        np.zeros(arrays.between.shape[2], np.int64),
         np.zeros(m, np.int64),
         np.zeros(m, np.int64),
         np.zeros(slots, np.int64),
@@ -141,17 +142,17 @@ def gain_of_visit(
             if s < visits.length[h]:
                 # What the plan has here is not done, or not as it was.
                 x = visits.target[h, s]
-                need_at(plan, trial, x, slot)
-                _open(visits.first, visits.following, trial, x, slot)
+                need_at(arrays, plan, trial, x, slot)
+                _open(arrays, visits.first, visits.following, trial, x, slot)
             while s < end and trial.cursor[h] < length and not settled:
                 q = _place_in_plan(trial, h, trial.cursor[h])
                 trial.cursor[h] += 1
                 x = j if q == NONE else visits.target[h, q]
                 before = 0.0 if q == NONE else plan.value[h, q]
-                need_at(plan, trial, x, slot)
+                need_at(arrays, plan, trial, x, slot)
                 if simulator.verdict(arrays, episodes, 0, h, x) == visit.ALLOWED:
                     exchange(total, before, simulator.act(arrays, episodes, 0, h, x))
-                    _open(visits.first, visits.following, trial, x, slot)
+                    _open(arrays, visits.first, visits.following, trial, x, slot)
                     if q == NONE:
                         tally[MADE] = 1
                     settled = True
@@ -168,8 +169,8 @@ def gain_of_visit(
                 charge(total, -plan.value[h, q])
         if arrays.terms[0].charge_return:
             back = simulator.leg_home(arrays, episodes, 0, h)
-            exchange(total, -visit.cost_of(arrays, 0, plan.back[h]), -visit.cost_of(arrays, 0, back))
-    if visit.has_closing_cost(arrays, 0):
+            exchange(total, -worth.cost_of(arrays, 0, plan.back[h]), -worth.cost_of(arrays, 0, back))
+    if worth.has_closing_cost(arrays, 0):
         exchange(total, -_closing_cost(arrays, plan, trial, False), -_closing_cost(arrays, plan, trial, True))
     if trial.target_mark[j] == mark:
         lacked, lacks = 0.0, 0.0
@@ -193,10 +194,10 @@ def gain_of_undisturbed_visit(
     charge(total, simulator.act(arrays, trial.episodes, 0, i, j))
     if place < plan.visits.length[i]:
         leg = visit.leg(arrays, 0, i, j, plan.visits.target[i, place])
-        exchange(total, -visit.cost_of(arrays, 0, plan.leg[i, place]), -visit.cost_of(arrays, 0, leg))
+        exchange(total, -worth.cost_of(arrays, 0, plan.leg[i, place]), -worth.cost_of(arrays, 0, leg))
     elif arrays.terms[0].charge_return:
         back = simulator.leg_home(arrays, trial.episodes, 0, i)
-        exchange(total, -visit.cost_of(arrays, 0, plan.back[i]), -visit.cost_of(arrays, 0, back))
+        exchange(total, -worth.cost_of(arrays, 0, plan.back[i]), -worth.cost_of(arrays, 0, back))
     return gain(total)
 
 
@@ -208,7 +209,8 @@ def is_undisturbed(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int,
     more. The UAV has enough for its later visits, and nobody comes in between where they are a step later.
     """
     m, length = plan.back.shape[0], plan.visits.length[i]
-    undisturbed = not visit.has_closing_cost(arrays, 0) and (place == length or not visit.decays(arrays, 0))
+    undisturbed = arrays.stock.shape[1] == 0 and not worth.has_closing_cost(arrays, 0)
+    undisturbed = undisturbed and (place == length or not worth.decays(arrays, 0))
     if undisturbed and place < length:
         for k in range(plan.load.shape[2]):
             taken = min(plan.load[i, place, k], trial.episodes.need[0, j, k])
@@ -239,7 +241,7 @@ def _closing_cost(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, changed:
         for w in range(arrays.before.shape[2]):
             if arrays.before[0, h, w] != NONE and not _visits_before(arrays, plan, h, length, w):
                 changes += 1.0
-    return visit.closing_cost(arrays, 0, makespan, changes)
+    return worth.closing_cost(arrays, 0, makespan, changes)
 
 
 @inlined
@@ -305,8 +307,8 @@ def take_up(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place:
 
 
 @inlined
-def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
-    """Give target `j` the need that it has in the plan just before a slot, unless the trial has changed it.
+def need_at(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
+    """Give a stop what it needs, or has, in the plan just before a slot, unless the trial has changed that.
 
     Returns
     -------
@@ -320,8 +322,12 @@ def need_at(plan: FlownPlan, trial: Trial, j: int, slot: int) -> bool:
         while later != NONE and later < slot:
             later = plan.visits.following[later]
         alone = bool(later == NONE)
+        d = j - arrays.need.shape[1] - 1
         for k in range(plan.need.shape[2]):
-            if alone:
+            if d >= 0:
+                there = plan.stock[d, k] if alone else plan.need[later % m, later // m, k]
+                trial.episodes.stock[0, d, k] = there
+            elif alone:
                 trial.episodes.need[0, j, k] = plan.remaining[j, k]
             else:
                 trial.episodes.need[0, j, k] = plan.need[later % m, later // m, k]
@@ -348,9 +354,11 @@ def _change(trial: Trial, h: int, cursor: int) -> None:
 
 
 @inlined
-def _open(first: Integers, following: Integers, trial: Trial, j: int, slot: int) -> None:
-    """Let a target have its own need from now on: the plan's later visits to it are flown again."""
-    if trial.target_mark[j] != trial.tally[MARK]:
+def _open(
+    arrays: ProblemArrays, first: Integers, following: Integers, trial: Trial, j: int, slot: int
+) -> None:
+    """Let a target, or base, have its own need from now on: the plan's later stops there are flown again."""
+    if trial.target_mark[j] != trial.tally[MARK] and not visit.is_unlimited(arrays, j):
         trial.target_mark[j] = trial.tally[MARK]
         later = first[j]
         while later != NONE:
@@ -362,33 +370,15 @@ def _open(first: Integers, following: Integers, trial: Trial, j: int, slot: int)
 @simulator.compiled
 def _push(queue: Integers, queue_mark: Integers, tally: Integers, slot: int) -> None:
     """Queue a slot, once."""
-    if queue_mark[slot] == tally[MARK]:
-        return
-    queue_mark[slot] = tally[MARK]
-    hole = tally[QUEUED]
-    tally[QUEUED] += 1
-    while hole > 0 and queue[(hole - 1) // 2] > slot:
-        queue[hole] = queue[(hole - 1) // 2]
-        hole = (hole - 1) // 2
-    queue[hole] = slot
+    if queue_mark[slot] != tally[MARK]:
+        queue_mark[slot] = tally[MARK]
+        push(queue, tally[QUEUED], slot)
+        tally[QUEUED] += 1
 
 
 @simulator.compiled
 def _pop(queue: Integers, tally: Integers) -> int:
     """Take the earliest slot out of the queue."""
-    slot = int(queue[0])
+    slot = pop(queue, tally[QUEUED])
     tally[QUEUED] -= 1
-    size = tally[QUEUED]
-    last, hole = queue[size], 0
-    while True:
-        child = 2 * hole + 1
-        if child >= size:
-            break
-        if child + 1 < size and queue[child + 1] < queue[child]:
-            child += 1
-        if queue[child] >= last:
-            break
-        queue[hole] = queue[child]
-        hole = child
-    queue[hole] = last
     return slot

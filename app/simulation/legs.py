@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.geometry import distance
-from app.domain.problem import Problem
+from app.domain.problem import Problem, Target
+from app.domain.surroundings import Base
 from app.simulation.distances import between_points
 from app.travel.choice import legs_between
 from app.travel.legs import LegBlock, Legs
@@ -28,21 +29,22 @@ UNREACHABLE = 1e30
 """Length and time of a leg that does not exist: beyond every limit, and finite, so nothing becomes NaN."""
 
 MOST_LEGS = 100_000_000
-"""Legs between targets, over all classes; their lengths and times take 16 bytes each."""
+"""Legs between targets and bases, over all classes; their lengths and times take 16 bytes each."""
 
 
 class LegArrays(NamedTuple):
     """Legs of one problem; C is the number of classes.
 
     Lengths are over ground. Where times are not given they are lengths over speeds, and their arrays have no
-    columns.
+    columns. Stops are targets and then bases, L of them.
 
     Attributes
     ----------
     start_target, between, home, start_home
-        (M, N), (C, N, N), (M, N), (M,) lengths; the last two are 0 where there is no way home.
-    homeless
-        (M, N) targets from which no leg leads home.
+        (M, L), (C, L, L), (M, L), (M,) lengths; the last two are to starting points, and 0 where no leg leads
+        there.
+    homeless, homeless_start
+        (M, L) stops and (M,) UAVs from which no leg leads to the starting point.
     leg_class
         (M,) class of each UAV.
     timed, in_wind
@@ -58,6 +60,7 @@ class LegArrays(NamedTuple):
     home: Floats
     start_home: Floats
     homeless: npt.NDArray[np.bool_]
+    homeless_start: npt.NDArray[np.bool_]
     leg_class: Integers
     timed: bool
     in_wind: bool
@@ -77,10 +80,15 @@ class _LegClass(NamedTuple):
 
 
 def places_of(problem: Problem) -> Floats:
-    """Return the current positions of M UAVs, their starting points, and N targets, (2M + N, 2)."""
+    """Return current positions of M UAVs, their starting points, N targets, D bases, (2M + N + D, 2)."""
     uavs = problem.uavs
     places = [(u.x_c, u.y_c) for u in uavs] + [(u.x_s, u.y_s) for u in uavs]
-    return np.array(places + [(t.x, t.y) for t in problem.targets], np.float64)
+    return np.array(places + [(stop.x, stop.y) for stop in stops_of(problem)], np.float64)
+
+
+def stops_of(problem: Problem) -> tuple[Target | Base, ...]:
+    """Return targets and bases, in this order."""
+    return (*problem.targets, *problem.bases)
 
 
 def zones_of(problem: Problem) -> list[Floats]:
@@ -109,27 +117,28 @@ def leg_arrays(problem: Problem) -> LegArrays:
         classes = _of_places(problem, wind)
     else:
         return _plain(problem)
-    if len(classes) * problem.n_targets**2 > MOST_LEGS:
+    stops = len(stops_of(problem))
+    if len(classes) * stops**2 > MOST_LEGS:
         raise ProblemTooLarge(
             f"{len(classes)} classes of UAVs (of other speeds in wind, of other profiles) times "
-            f"{problem.n_targets}² legs between targets are {len(classes) * problem.n_targets**2}; "
+            f"{stops}² legs between targets and bases are {len(classes) * stops**2}; "
             f"the limit is {MOST_LEGS}",
-            details={"legs": len(classes) * problem.n_targets**2, "limit": MOST_LEGS},
+            details={"legs": len(classes) * stops**2, "limit": MOST_LEGS},
         )
     return _measured(problem, classes, wind is not None)
 
 
 def _plain(problem: Problem) -> LegArrays:
-    uavs, targets = problem.uavs, problem.targets
+    uavs, stops = problem.uavs, stops_of(problem)
     start = np.array([(u.x_s, u.y_s) for u in uavs], dtype=np.float64)
     current = np.array([(u.x_c, u.y_c) for u in uavs], dtype=np.float64)
-    area = np.array([(t.x, t.y) for t in targets], dtype=np.float64)
-    start_target = between_points(problem.crs, current, area)
+    stop = np.array([(each.x, each.y) for each in stops], dtype=np.float64)
+    start_target = between_points(problem.crs, current, stop)
     # Most swarms are where they start, and have the same way to a target as home from it.
-    home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, area)
+    home = start_target.copy() if np.array_equal(start, current) else between_points(problem.crs, start, stop)
     start_home = [distance(problem.crs, u.x_c, u.y_c, u.x_s, u.y_s) for u in uavs]
-    between = between_points(problem.crs, area, area)[None]
-    legs = _room(len(uavs), len(targets), 1, False)
+    between = between_points(problem.crs, stop, stop)[None]
+    legs = _room(len(uavs), len(stops), 1, False)
     return legs._replace(
         start_target=start_target, between=between, home=home, start_home=np.array(start_home, np.float64)
     )
@@ -141,7 +150,7 @@ def _of_matrices(problem: Problem) -> list[_LegClass]:
     timed = any(matrix.duration is not None for matrix in matrices.values())
     here = [u.location for u in problem.uavs]
     home = [u.location if u.home_location is None else u.home_location for u in problem.uavs]
-    rows = np.array([*here, *home, *(t.location for t in problem.targets)], np.int64)
+    rows = np.array([*here, *home, *(stop.location for stop in stops_of(problem))], np.int64)
     members: dict[tuple[str, float | None], list[int]] = {}
     for i, uav in enumerate(problem.uavs):
         profile = only if uav.profile is None else uav.profile
@@ -167,23 +176,23 @@ def _of_places(problem: Problem, wind: Wind | None) -> list[_LegClass]:
 
 
 def _measured(problem: Problem, classes: list[_LegClass], in_wind: bool) -> LegArrays:
-    m, n = problem.n_uavs, problem.n_targets
+    m, stops = problem.n_uavs, len(stops_of(problem))
     timed = classes[0].speed is not None
     # Round zones the way is the shortest, which in wind need not be the quickest.
     metric = problem.matrices is None and not (problem.no_fly_zones and in_wind)
-    found = _room(m, n, len(classes), timed)._replace(in_wind=in_wind, metric=metric)
-    area = 2 * m + np.arange(n)
+    found = _room(m, stops, len(classes), timed)._replace(in_wind=in_wind, metric=metric)
+    stop = 2 * m + np.arange(stops)
     blocks: dict[int, LegBlock] = {}
     for c, (legs, speed, here) in enumerate(classes):
         found.leg_class[here] = c
         if id(legs) not in blocks:
-            blocks[id(legs)] = legs.between(area[:, None], area)
+            blocks[id(legs)] = legs.between(stop[:, None], stop)
         between, between_time = _existing(blocks[id(legs)], speed)
-        out, out_time = _existing(legs.between(here[:, None], area), speed)
-        back, back_time = _existing(legs.between(area[:, None], m + here), speed)
+        out, out_time = _existing(legs.between(here[:, None], stop), speed)
+        back, back_time = _existing(legs.between(stop[:, None], m + here), speed)
         direct, direct_time = _existing(legs.between(here, m + here), speed)
         found.between[c], found.start_target[here] = _or(between, UNREACHABLE), _or(out, UNREACHABLE)
-        found.homeless[here] = np.isinf(back.T)
+        found.homeless[here], found.homeless_start[here] = np.isinf(back.T), np.isinf(direct)
         found.home[here], found.start_home[here] = _or(back.T, 0.0), _or(direct, 0.0)
         if timed:
             found.between_time[c] = _or(between_time, UNREACHABLE)
@@ -209,21 +218,22 @@ def _or(values: Floats, instead: float) -> Floats:
     return np.where(np.isinf(values), instead, values)
 
 
-def _room(m: int, n: int, classes: int, timed: bool) -> LegArrays:
+def _room(m: int, stops: int, classes: int, timed: bool) -> LegArrays:
     """Make room for legs; all are of one class, and there is a way home from everywhere."""
-    timed_n = n if timed else 0
+    timed_stops = stops if timed else 0
     return LegArrays(
-        start_target=np.empty((m, n)),
-        between=np.empty((classes, n, n)),
-        home=np.empty((m, n)),
+        start_target=np.empty((m, stops)),
+        between=np.empty((classes, stops, stops)),
+        home=np.empty((m, stops)),
         start_home=np.empty(m),
-        homeless=np.zeros((m, n), np.bool_),
+        homeless=np.zeros((m, stops), np.bool_),
+        homeless_start=np.zeros(m, np.bool_),
         leg_class=np.zeros(m, np.int64),
         timed=timed,
         in_wind=False,
         metric=True,
-        start_time=np.empty((m, timed_n)),
-        between_time=np.empty((classes, timed_n, timed_n)),
-        home_time=np.empty((m, timed_n)),
+        start_time=np.empty((m, timed_stops)),
+        between_time=np.empty((classes, timed_stops, timed_stops)),
+        home_time=np.empty((m, timed_stops)),
         start_home_time=np.zeros(m),
     )

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.domain.allocation import LandingRoute, TimedStop
+from app.domain.allocation import LandingRoute, LandingSomewhere, Reload, TimedStop
 from app.domain.plan import Plan
 from app.domain.problem import ROUNDING, UAV, Problem, Target
+from app.domain.surroundings import Base
 from app.simulation.breaches import breaches_of
 from app.simulation.explain import timed_routes
 from app.simulation.legs import wind_of, zones_of
@@ -23,7 +24,8 @@ def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
 
     A UAV between two places is on its way, and committed to the visit that it is flying to; with matrices it
     is where it is flying to, and available when it arrives. One that unloads is there until it has, with the
-    unloading done. Who has landed for good is returning. The rest of the plan is the ``start_plan``.
+    unloading done, and one at a base has reloaded.
+    Who has landed for good is returning. The rest of the plan is the ``start_plan``.
 
     Parameters
     ----------
@@ -38,19 +40,29 @@ def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
         If the plan is not legal.
     """
     routes = timed_routes(problem, plan)
-    index = {target.id: j for j, target in enumerate(problem.targets)}
+    n = problem.n_targets
+    targets = {target.id: j for j, target in enumerate(problem.targets)}
+    bases = {base.id: n + 1 + d for d, base in enumerate(problem.bases)}
     needs = [list(target.loadlist) for target in problem.targets]
+    taken = [[0.0] * problem.n_materials for _ in problem.bases]
     flights = [_Flight(problem, i, route, at) for i, route in enumerate(routes)]
     for flight in flights:
         for stop in flight.begun:
-            need = needs[index[stop.target_id]]
-            for k, amount in enumerate(stop.delivered):
-                need[k] -= amount
-    rests = [[index[stop.target_id] for stop in flight.rest] for flight in flights]
+            if isinstance(stop, Reload):
+                less, sign, amounts = taken[bases[stop.base_id] - n - 1], 1.0, stop.loaded
+            else:
+                less, sign, amounts = needs[targets[stop.target_id]], -1.0, stop.delivered
+            for k, amount in enumerate(amounts):
+                less[k] += sign * amount
+    rests = [
+        [bases[stop.base_id] if isinstance(stop, Reload) else targets[stop.target_id] for stop in flight.rest]
+        for flight in flights
+    ]
     left = replace(
         problem,
         uavs=tuple(flight.uav for flight in flights),
         targets=tuple(map(_with_need, problem.targets, needs)),
+        bases=tuple(map(_without, problem.bases, taken)),
         start_plan=((problem.n_targets,) * problem.n_uavs,),
     )
     return replace(left, start_plan=_legal_rest(left, rests))
@@ -66,7 +78,7 @@ def _legal_rest(problem: Problem, rests: list[list[int]]) -> tuple[tuple[int, ..
     while True:
         steps = max(1, *map(len, rests))
         rows = tuple(tuple(rest[s] if s < len(rest) else home for rest in rests) for s in range(steps))
-        broken = breaches_of(problem, Plan(rows)) if problem.objective.unloading == "greedy" else []
+        broken = breaches_of(problem, Plan(rows)) if not problem.plans_unloading else []
         if not broken:
             return rows
         first = broken[0]
@@ -79,6 +91,19 @@ def _with_need(target: Target, need: Sequence[float]) -> Target:
         amount if amount >= ROUNDING * all_of else 0.0 for amount, all_of in zip(need, whole, strict=True)
     )
     return target if left == target.loadlist else replace(target, loadlist=left, requested=whole)
+
+
+def _without(base: Base, taken: Sequence[float]) -> Base:
+    if base.stock is None or not any(taken):
+        return base
+    left = (
+        had - gone if had - gone >= ROUNDING * had else 0.0
+        for had, gone in zip(base.stock, taken, strict=True)
+    )
+    return replace(base, stock=tuple(left))
+
+
+_Place = Target | Base
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +124,13 @@ class _Flight:
     uav
         As it is then.
     begun, rest
-        Visits that have begun, and those that have not.
+        Stops that have begun, and those that have not.
     """
 
     def __init__(self, problem: Problem, i: int, route: LandingRoute, at: float) -> None:
         self._problem, self._i, self._at = problem, i, at
-        self.begun: list[TimedStop] = []
-        self.rest: list[TimedStop] = [stop for stop in route.stops if isinstance(stop, TimedStop)]
+        self.begun: list[TimedStop | Reload] = []
+        self.rest = [stop for stop in route.stops if isinstance(stop, TimedStop | Reload)]
         self.uav = problem.uavs[i]
         self._home = self.uav.location if self.uav.home_location is None else self.uav.home_location
         if not self.uav.ret:
@@ -113,55 +138,83 @@ class _Flight:
 
     def _fly(self, route: LandingRoute) -> UAV:
         uav, at = self.uav, self._at
-        clock, flown, aloft, place = uav.available_from, uav.dis, uav.airborne, None
+        clock, flown, aloft = uav.available_from, uav.dis, uav.airborne
+        place: _Place | None = None
         if at <= clock:
             return uav
         while self.rest:
             stop = self.rest[0]
-            target = self._target(stop)
-            wait = 0.0
-            if uav.begins_on_ground and place is None:
-                # It takes off no sooner than it has to, and no later than its deadline lets it.
-                last = math.inf if target.deadline is None else target.deadline
-                wait = max(0.0, min(stop.begin_time, last) - stop.arrival_time)
-            leg = self._leg(clock + wait, stop.arrival_time + wait, stop.distance, place, target)
+            there = self._place_of(stop)
+            wait = self._waits_on_ground(stop, place)
+            leg = self._leg(clock + wait, stop.arrival_time + wait, stop.distance, place, there)
             if at < leg.takeoff:
-                return replace(uav, available_from=at)
-            if at < stop.begin_time:
-                going = (stop.target_id, *uav.committed[len(self.begun) + 1 :])
-                return replace(self._on_way(leg, flown, aloft, target), committed=going)
+                return self._still(uav, place, at)
+            if isinstance(stop, Reload):
+                if at < stop.arrival_time:
+                    return self._on_way(leg, flown, aloft, there)
+                flown, aloft = 0.0, 0.0
+            else:
+                if at < stop.begin_time:
+                    going = (stop.target_id, *uav.committed[len(self.begun) + 1 :])
+                    return replace(self._on_way(leg, flown, aloft, there), committed=going)
+                flown, aloft = flown + leg.air, aloft + stop.departure_time - leg.takeoff
             self.begun.append(self.rest.pop(0))
-            clock, flown, place = stop.departure_time, flown + leg.air, target
-            aloft += stop.departure_time - leg.takeoff
+            clock, place = stop.departure_time, there
             uav = self._after(uav, stop)
             if at < clock:
-                return self._at_place(uav, target, clock, flown, aloft)
+                return self._at_place(uav, there, clock, flown, aloft)
         if place is None:
             return replace(uav, available_from=at)
         if not self._problem.objective.return_to_base:
             return replace(self._at_place(uav, place, at, flown, aloft), ret=True)
         self.uav = uav
         landing = clock if route.landing is None else route.landing.time
-        leg = self._leg(clock, landing, route.return_distance, place, None)
+        home = None
+        if isinstance(route.landing, LandingSomewhere) and route.landing.base_id is not None:
+            home = self._base(route.landing.base_id)
+        leg = self._leg(clock, landing, route.return_distance, place, home)
         if at < landing and leg.way is not None:
-            return self._on_way(leg, flown, aloft, None)
-        there = self._at_place(uav, None, max(at, landing), flown + leg.air, aloft + landing - clock)
-        return replace(there, ret=True)
+            return self._on_way(leg, flown, aloft, home)
+        landed = self._at_place(uav, home, max(at, landing), flown + leg.air, aloft + landing - clock)
+        return replace(landed, ret=True)
 
-    def _target(self, stop: TimedStop) -> Target:
+    def _waits_on_ground(self, stop: TimedStop | Reload, place: _Place | None) -> float:
+        """Return how long it waits before it takes off: no longer than the area's deadline lets it."""
+        uav, there = self._problem.uavs[self._i], self._place_of(stop)
+        on_ground = isinstance(place, Base) or (place is None and uav.begins_on_ground)
+        if not on_ground or isinstance(stop, Reload) or isinstance(there, Base):
+            return 0.0
+        last = math.inf if there.deadline is None else there.deadline
+        return max(0.0, min(stop.begin_time, last) - stop.arrival_time)
+
+    def _still(self, uav: UAV, place: _Place | None, clock: float) -> UAV:
+        """Return the UAV on the ground where it is."""
+        if place is None:
+            return replace(uav, available_from=clock)
+        return self._at_place(uav, place, clock, 0.0, 0.0)
+
+    def _place_of(self, stop: TimedStop | Reload) -> _Place:
+        if isinstance(stop, Reload):
+            return self._base(stop.base_id)
         return next(target for target in self._problem.targets if target.id == stop.target_id)
 
-    def _after(self, uav: UAV, stop: TimedStop) -> UAV:
-        """Return the UAV without what a visit has unloaded; a commitment to it is kept."""
-        whole = self._problem.uavs[self._i].loadlist
-        left = tuple(
-            have - gone if have - gone >= ROUNDING * all_of else 0.0
-            for have, gone, all_of in zip(uav.loadlist, stop.delivered, whole, strict=True)
-        )
-        return replace(uav, loadlist=left)
+    def _base(self, base_id: str) -> Base:
+        return next(base for base in self._problem.bases if base.id == base_id)
 
-    def _at_place(self, uav: UAV, target: Target | None, clock: float, flown: float, aloft: float) -> UAV:
-        """Return the UAV at a target, or at its starting point."""
+    def _after(self, uav: UAV, stop: TimedStop | Reload) -> UAV:
+        """Return the UAV with what is aboard after a stop; a commitment to a visit is kept."""
+        before = self._problem.uavs[self._i]
+        whole = map(max, before.loadlist, before.full)
+        change = stop.loaded if isinstance(stop, Reload) else tuple(-amount for amount in stop.delivered)
+        left = tuple(
+            have + more if have + more >= ROUNDING * all_of else 0.0
+            for have, more, all_of in zip(uav.loadlist, change, whole, strict=True)
+        )
+        # What it leaves a base with is what it had at first, where nothing else is said.
+        return replace(uav, loadlist=left, full_load=before.full if self._problem.bases else before.full_load)
+
+    def _at_place(self, uav: UAV, target: _Place | None, clock: float, flown: float, aloft: float) -> UAV:
+        """Return the UAV at a target or base, or at its starting point."""
         x, y = (uav.x_s, uav.y_s) if target is None else (target.x, target.y)
         location = self._home if target is None else target.location
         return replace(
@@ -169,7 +222,7 @@ class _Flight:
             available_from=clock, committed=uav.committed[len(self.begun) :],
         )  # fmt: skip
 
-    def _on_way(self, leg: _Leg, flown: float, aloft: float, target: Target | None) -> UAV:
+    def _on_way(self, leg: _Leg, flown: float, aloft: float, target: _Place | None) -> UAV:
         """Return the UAV on a leg, or waiting at its end."""
         uav, at = self.uav if not self.begun else self._unloaded(), self._at
         if leg.way is None:
@@ -177,8 +230,8 @@ class _Flight:
             return self._at_place(uav, target, clock, flown + leg.air, aloft + clock - leg.takeoff)
         if at >= leg.arrival:
             # It is there in time, however long it waits.
-            late = target is not None and target.deadline is not None and target.deadline < at
-            clock = max(leg.arrival, target.deadline) if late and target and target.deadline else at
+            deadline = target.deadline if isinstance(target, Target) else None
+            clock = at if deadline is None or deadline >= at else max(leg.arrival, deadline)
             return self._at_place(uav, target, clock, flown + leg.air, aloft + clock - leg.takeoff)
         x, y, air = _point_on(leg.way, at - leg.takeoff, self._problem.crs)
         there = self._at_place(uav, target, at, flown + air, aloft + at - leg.takeoff)
@@ -191,7 +244,7 @@ class _Flight:
         return uav
 
     def _leg(
-        self, takeoff: float, arrival: float, length: float, origin: Target | None, target: Target | None
+        self, takeoff: float, arrival: float, length: float, origin: _Place | None, target: _Place | None
     ) -> _Leg:
         if self._problem.matrices is not None:
             return _Leg(takeoff, arrival, length, None)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation import simulator, visit
+from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.from_start import Start, carries, direct_rule
@@ -149,6 +149,8 @@ class Lookout:
         if lacks & TIME:
             route = self._plan.visits.target[i, place : self._plan.visits.length[i]].tolist()
             for x, after in zip([j, *route], self._lacking[2:].tolist(), strict=False):
+                if x > self._arrays.shape[1]:
+                    continue
                 deadline = float(self._arrays.areas["deadline"][0, x])
                 if visit.is_late(deadline + after, deadline):
                     late[x] = max(after, late.get(x, 0.0))
@@ -244,7 +246,8 @@ def _ease(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: Floats) 
     arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = _EASED, np.inf
     for s in range(length):
         x = plan.visits.target[i, s]
-        kept[2 + s], arrays.areas[0, x].deadline = arrays.areas[0, x].deadline, np.inf
+        if not visit.is_base(arrays, x):
+            kept[2 + s], arrays.areas[0, x].deadline = arrays.areas[0, x].deadline, np.inf
     arrays.max_steps[0] += 1
 
 
@@ -254,7 +257,9 @@ def _ease_no_more(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, kept: 
     length = plan.visits.length[i]
     arrays.max_steps[0] -= 1
     for s in range(length):
-        arrays.areas[0, plan.visits.target[i, length - 1 - s]].deadline = kept[1 + length - s]
+        x = plan.visits.target[i, length - 1 - s]
+        if not visit.is_base(arrays, x):
+            arrays.areas[0, x].deadline = kept[1 + length - s]
     arrays.uavs[0, i].voyage, arrays.areas[0, j].deadline = kept[0], kept[1]
 
 
@@ -268,7 +273,7 @@ def _is_legal(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, plac
         legal = simulator.reach_verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     if legal:
         take_up(arrays, plan, trial, i, place)
-        need_at(plan, trial, j, place * plan.back.shape[0] + i)
+        need_at(arrays, plan, trial, j, place * plan.back.shape[0] + i)
         legal = simulator.verdict(arrays, trial.episodes, 0, i, j) == visit.ALLOWED
     return legal
 
@@ -280,7 +285,7 @@ def _greedy_gain(
     """Change of the reward with a legal visit; quick where it takes nothing from other visits."""
     begin(trial, i, place, j)
     take_up(arrays, plan, trial, i, place)
-    alone = need_at(plan, trial, j, place * plan.back.shape[0] + i) and keeps_all
+    alone = need_at(arrays, plan, trial, j, place * plan.back.shape[0] + i) and keeps_all
     if alone and is_undisturbed(arrays, plan, trial, i, place, j):
         gain = gain_of_undisturbed_visit(arrays, plan, trial, i, place, j)
     else:
@@ -301,8 +306,8 @@ def _hope(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) ->
     still = 0.0
     for k in range(plan.remaining.shape[1]):
         still += plan.remaining[j, k]
-    hope: float = visit.earned_by(arrays, 0, j, still)
-    hope -= visit.cost_of(arrays, 0, detour(arrays, plan, i, place, j))
+    hope: float = worth.earned_by(arrays, 0, j, still)
+    hope -= worth.cost_of(arrays, 0, detour(arrays, plan, i, place, j))
     return hope
 
 

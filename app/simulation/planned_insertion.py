@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import ROUNDING
-from app.simulation import simulator, visit
+from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.deliveries import Unloading, Visits, new_unloading, serve, visits_of
 from app.simulation.flown_plan import FlownPlan
@@ -307,19 +307,19 @@ def _charge_way(
     at = before = visit.START
     for s in range(length + 1):
         if s == place:
-            charge(total, -visit.cost_of(arrays, 0, visit.leg(arrays, 0, h, at, j)))
+            charge(total, -worth.cost_of(arrays, 0, visit.leg(arrays, 0, h, at, j)))
             at = j
         if s == length:
             break
         x = visits.target[h, s]
         if left_out[s]:
-            charge(total, visit.cost_of(arrays, 0, leg[h, s]))
+            charge(total, worth.cost_of(arrays, 0, leg[h, s]))
         else:
             if at != before:
                 now = visit.leg(arrays, 0, h, at, x)
-                exchange(total, -visit.cost_of(arrays, 0, leg[h, s]), -visit.cost_of(arrays, 0, now))
+                exchange(total, -worth.cost_of(arrays, 0, leg[h, s]), -worth.cost_of(arrays, 0, now))
             at = x
         before = x
     if arrays.terms[0].charge_return and at != before:
         now = visit.way_home(arrays, 0, h, at)
-        exchange(total, -visit.cost_of(arrays, 0, back[h]), -visit.cost_of(arrays, 0, now))
+        exchange(total, -worth.cost_of(arrays, 0, back[h]), -worth.cost_of(arrays, 0, now))

@@ -29,6 +29,8 @@ from app.simulation.visit import (
     TOO_MANY_STEPS,
     TOO_MUCH,
     UNLOADS_NOTHING,
+)
+from app.simulation.worth import (
     closing_cost,
     has_closing_cost,
 )
@@ -99,7 +101,8 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
     state = Episodes(
         np.zeros(1, np.int64), np.empty((1, m), np.int64), np.empty((1, m)), np.empty((1, m)),
         np.empty((1, m)), np.empty((1, m), np.int64), np.empty((1, m), np.bool_), np.empty((1, m, k)),
-        np.empty((1, n, k)), np.empty((1, m, arrays.before.shape[2]), np.bool_),
+        np.empty((1, arrays.stock.shape[1], k)), np.empty((1, n, k)),
+        np.empty((1, m, arrays.before.shape[2]), np.bool_),
         np.empty(1), np.empty(1), np.empty(1, np.int64), np.empty(1, np.bool_),
     )  # fmt: skip
     for b in range(batch):
@@ -110,11 +113,11 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
         while rule == ALLOWED and s < steps:
             for i in range(m):
                 action = plans[b, s, i]
-                if action < 0 or action > n:
+                if action < 0 or action > n + arrays.stock.shape[1]:
                     rule = NO_SUCH_ACTION
                 elif action < n and planned:
                     rule = delivery_verdict(arrays, state, i, action, delivered[b], s)
-                elif action < n:
+                elif action != n:
                     rule = verdict(arrays, state, 0, i, action)
                 if rule != ALLOWED:
                     result.step[b], result.uav[b] = s, i

@@ -65,8 +65,11 @@ def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, 
         flown += visit.air_length(arrays, 0, i, leg, time)
         lacks[1] = max(lacks[1], visit.flown_with_return(arrays, 0, i, x, flown) - voyage)
         arrival = clock + time
-        lacks[3 + s - place] = arrival - arrays.areas[0, x].deadline
-        late = late or visit.is_late(arrival, arrays.areas[0, x].deadline)
+        if visit.is_base(arrays, x):
+            flown, lacks[3 + s - place] = 0.0, 0.0
+        else:
+            lacks[3 + s - place] = arrival - arrays.areas[0, x].deadline
+            late = late or visit.is_late(arrival, arrays.areas[0, x].deadline)
         clock, at = visit.departure_after(arrays, 0, x, arrival), x
     if voyage + lacks[1] > visit.farthest(voyage):
         lack += RANGE

@@ -24,24 +24,29 @@ from app.simulation.visit import (
     airborne,
     aloft_after,
     begin_after,
-    bonus_of,
     can_unload,
-    closing_cost,
-    cost_of,
-    decays,
     departure_after,
-    discount,
-    earned_by,
-    has_bonus,
-    has_closing_cost,
+    is_base,
     is_watched,
     left_of,
     leg,
     leg_time,
+    loaded_of,
+    most_carried,
     reach_rule,
     ready,
     time_home,
     way_home,
+)
+from app.simulation.worth import (
+    bonus_of,
+    closing_cost,
+    cost_of,
+    decays,
+    discount,
+    earned_by,
+    has_bonus,
+    has_closing_cost,
 )
 
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
@@ -70,17 +75,19 @@ class Episodes(NamedTuple):
     problem
         (B,) index into the stack of problems.
     at
-        (B, M) where each UAV is: ``START``, a target, or N for its starting point.
+        (B, M) where each UAV is: ``START``, a target or base, or N where it has landed for good.
     flown, clock
         (B, M) air length flown in this flight, and the time.
     aloft
         (B, M) time in the air in this flight, of UAVs for which it counts.
     visits
-        (B, M) visits made.
+        (B, M) visits and reloads made.
     ret
         (B, M) UAVs that have been sent home.
     load
         (B, M, K) amounts still carried.
+    stock
+        (B, D, K) amounts still at the bases.
     need
         (B, N, K) amounts still needed.
     kept
@@ -101,6 +108,7 @@ class Episodes(NamedTuple):
     visits: Integers
     ret: Flags
     load: Floats
+    stock: Floats
     need: Floats
     kept: Flags
     satisfaction: Floats
@@ -132,6 +140,7 @@ def new_episodes(arrays: ProblemArrays, batch: int, problem: Integers | None = N
         visits=np.empty((batch, m), np.int64),
         ret=np.empty((batch, m), np.bool_),
         load=np.empty((batch, m, k)),
+        stock=np.empty((batch, arrays.n_bases, k)),
         need=np.empty((batch, n, k)),
         kept=np.empty((batch, m, before), np.bool_),
         satisfaction=np.empty(batch),
@@ -169,6 +178,9 @@ def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
     for j in range(episodes.need.shape[1]):
         for k in range(materials):
             episodes.need[b, j, k] = arrays.need[p, j, k]
+    for d in range(episodes.stock.shape[1]):
+        for k in range(materials):
+            episodes.stock[b, d, k] = arrays.stock[p, d, k]
     episodes.satisfaction[b] = 0.0
     episodes.distance[b] = 0.0
     episodes.step[b] = 0
@@ -176,22 +188,45 @@ def reset_one(arrays: ProblemArrays, episodes: Episodes, b: int) -> None:
 
 
 @compiled
+def copy_episode(episodes: Episodes, b: int, others: Episodes, other: int) -> None:
+    """Put episode `b` in the place of one of others of the same problems."""
+    others.problem[other] = episodes.problem[b]
+    for i in range(episodes.at.shape[1]):
+        others.at[other, i], others.visits[other, i] = episodes.at[b, i], episodes.visits[b, i]
+        others.flown[other, i], others.clock[other, i] = episodes.flown[b, i], episodes.clock[b, i]
+        others.aloft[other, i], others.ret[other, i] = episodes.aloft[b, i], episodes.ret[b, i]
+        for k in range(episodes.load.shape[2]):
+            others.load[other, i, k] = episodes.load[b, i, k]
+        for w in range(episodes.kept.shape[2]):
+            others.kept[other, i, w] = episodes.kept[b, i, w]
+    for k in range(episodes.load.shape[2]):
+        for j in range(episodes.need.shape[1]):
+            others.need[other, j, k] = episodes.need[b, j, k]
+        for d in range(episodes.stock.shape[1]):
+            others.stock[other, d, k] = episodes.stock[b, d, k]
+    others.satisfaction[other], others.distance[other] = episodes.satisfaction[b], episodes.distance[b]
+    others.step[other], others.done[other] = episodes.step[b], episodes.done[b]
+
+
+@compiled
 def leg_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
-    """Distance from where UAV `i` is to target `j` (rule 1 of section 3)."""
+    """Distance from where UAV `i` is to stop `j` (rule 1 of section 3)."""
     return leg(arrays, episodes.problem[b], i, episodes.at[b, i], j)
 
 
 @compiled
 def leg_home(arrays: ProblemArrays, episodes: Episodes, b: int, i: int) -> float:
-    """Distance from where UAV `i` is to its starting point."""
+    """Distance from where UAV `i` is to where it lands."""
     return way_home(arrays, episodes.problem[b], i, episodes.at[b, i])
 
 
 @merged
 def verdict(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> int:
-    """Rule 2 of section 3: ``ALLOWED``, or the rule that a visit of UAV `i` to target `j` breaks now."""
+    """Rule 2: ``ALLOWED``, or the rule that UAV `i` breaks now with a visit to `j`, or a reload there."""
     if episodes.ret[b, i]:
         return RETURNING
+    if is_base(arrays, j):
+        return reach_verdict(arrays, episodes, b, i, j)
     useful = False
     for k in range(episodes.load.shape[2]):
         if can_unload(episodes.load[b, i, k], episodes.need[b, j, k]):
@@ -243,6 +278,8 @@ def act(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, action: int) 
             return 0.0
         episodes.distance[b] += d
         return -cost_of(arrays, p, d)
+    if action > home:
+        return reload(arrays, episodes, b, i, action)
     d = fly_to(arrays, episodes, b, i, action)
     earned = 0.0
     for k in range(episodes.load.shape[2]):
@@ -282,6 +319,24 @@ def earned_now(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int
     return earned
 
 
+@compiled
+def reload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
+    """Land UAV `i` at base `j`, let it reload, and return what that earns, 0 or less (section 9)."""
+    p, d = episodes.problem[b], j - arrays.need.shape[1] - 1
+    length = leg(arrays, p, i, episodes.at[b, i], j)
+    arrival = episodes.clock[b, i] + leg_time(arrays, p, i, episodes.at[b, i], j, length)
+    episodes.clock[b, i] = departure_after(arrays, p, j, arrival)
+    episodes.flown[b, i], episodes.aloft[b, i] = 0.0, 0.0
+    episodes.at[b, i] = j
+    episodes.visits[b, i] += 1
+    episodes.distance[b] += length
+    for k in range(episodes.load.shape[2]):
+        loaded = loaded_of(episodes.load[b, i, k], arrays.full[p, i, k], episodes.stock[b, d, k])
+        episodes.load[b, i, k] += loaded
+        episodes.stock[b, d, k] -= loaded
+    return -cost_of(arrays, p, length)
+
+
 @merged
 def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
     """Take UAV `i` to target `j` and through its service time (rules 1 and 3); return the leg's length."""
@@ -290,9 +345,8 @@ def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) ->
     time = leg_time(arrays, p, i, at, j, length)
     end = departure_after(arrays, p, j, clock + time)
     if is_watched(arrays, p, i):
-        first = episodes.visits[b, i] == 0
         episodes.aloft[b, i] = aloft_after(
-            arrays, p, i, first, episodes.aloft[b, i], clock, clock + time, end, j
+            arrays, p, i, at, episodes.aloft[b, i], clock, clock + time, end, j
         )
     episodes.clock[b, i] = end
     episodes.flown[b, i] += air_length(arrays, p, i, length, time)
@@ -309,7 +363,7 @@ def fly_to(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) ->
 def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k: int, amount: float) -> float:
     """Unload an amount of material `k`, and return what it earns (rules 4 and 5)."""
     p, need = episodes.problem[b], episodes.need[b, j, k]
-    episodes.load[b, i, k] = left_of(episodes.load[b, i, k], amount, arrays.load[p, i, k])
+    episodes.load[b, i, k] = left_of(episodes.load[b, i, k], amount, most_carried(arrays, p, i, k))
     episodes.need[b, j, k] = left_of(need, amount, arrays.requested[p, j, k])
     earned = earned_by(arrays, p, j, amount)
     return earned + bonus_of(arrays, p, j, k, need, amount) if has_bonus(arrays, p) else earned
@@ -319,7 +373,8 @@ def unload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int, k:
 def end_step(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
     """Close a decision step, and the episode with it when nothing more can be earned.
 
-    An episode is over when all UAVs have returned, no UAV has an allowed visit left, or S steps are closed.
+    An episode is over when all UAVs have returned, no UAV has an allowed visit or reload left, or S steps are
+    closed.
     Then every UAV that is still out flies home.
 
     Returns
@@ -370,17 +425,18 @@ def changes_of(arrays: ProblemArrays, episodes: Episodes, b: int) -> float:
 
 @compiled
 def any_allowed(arrays: ProblemArrays, episodes: Episodes, b: int) -> bool:
-    """Whether any UAV has an allowed visit now."""
+    """Whether any UAV has an allowed visit, or reload, now."""
+    home = episodes.need.shape[1]
     for i in range(episodes.ret.shape[1]):
-        for j in range(episodes.need.shape[1]):
-            if verdict(arrays, episodes, b, i, j) == ALLOWED:
+        for j in range(home + 1 + episodes.stock.shape[1]):
+            if j != home and verdict(arrays, episodes, b, i, j) == ALLOWED:
                 return True
     return False
 
 
 @compiled
 def allowed_actions(arrays: ProblemArrays, episodes: Episodes, out: Flags) -> None:
-    """Fill the masks of this moment: home is always allowed, a visit as :func:`verdict` says.
+    """Fill the masks of visits at this moment: home is always allowed, a visit as :func:`verdict` says.
 
     Parameters
     ----------

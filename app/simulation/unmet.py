@@ -19,7 +19,7 @@ from app.domain.problem import Problem
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
-from app.simulation.from_start import Start, direct_rule, look_from_start, needs_of
+from app.simulation.from_start import Start, direct_rule, is_carried, look_from_start, needs_of
 from app.simulation.insertion import new_trial
 from app.simulation.legs import UNREACHABLE
 from app.simulation.openings import AS_IS, Lookout, Places
@@ -61,7 +61,7 @@ def unmet_targets(
     hurry
         Once it is true, nothing more is looked at.
     """
-    planned = problem.objective.unloading == "planned"
+    planned = problem.plans_unloading
     plan = record_plan(arrays, actions, delivered, planned)
     open_targets = np.flatnonzero(plan.remaining.max(axis=1) > 0)
     if not len(open_targets):
@@ -164,13 +164,12 @@ class _Evaluator:
         return UnmetCode.OUT_OF_RANGE, self._says.no_leg(), None
 
     def _carries(self, i: int, j: int) -> bool:
-        """Whether UAV `i` can be sent and carries, at first, what target `j` still needs at the end."""
-        useful = (self._arrays.load[0, i] > 0) & (self._plan.remaining[j] > 0)
-        return bool(useful.any() and not self._arrays.ret[0, i])
+        """Whether UAV `i` can be sent and carries, now or from a base, what target `j` needs at the end."""
+        return bool(is_carried(self._arrays, self._plan, i, j))
 
     def _is_cut_off(self, j: int) -> bool:
         """Whether no leg at all leads to target `j`: then it is not the wind alone."""
-        others = np.arange(self._arrays.shape[1]) != j
+        others = np.arange(self._arrays.between.shape[2]) != j
         into = self._arrays.between[0][:, others, j]
         return bool((self._arrays.start_target[0, :, j] >= UNREACHABLE).all() and (into >= UNREACHABLE).all())
 

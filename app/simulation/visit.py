@@ -1,11 +1,12 @@
-"""The rules of a visit (section 3 of the specification), and the only place that knows them.
+"""The rules of a visit and of a reload (sections 3 and 9 of the rules), and the only place that knows them.
 
-What a leg is, whether a visit is allowed and why not, when it ends, what is left of loads and needs, and what
-it earns and costs. The simulator, the searches, bounds, explanations and the learners' observation ask here.
-The functions are compiled as a part of their callers, so asking costs nothing.
+What a leg is, whether an action is allowed and why not, when it ends, and what is left of loads, needs and
+stocks; what a visit earns is in :mod:`app.simulation.worth`. The simulator, the searches, bounds,
+explanations and the learners' observation ask here. The functions are compiled as a part of their callers, so
+asking costs nothing.
 
-Everywhere `p` is a problem of the stack, `i` a UAV, `j` a target, and `at` where the UAV is: ``START``, a
-target, or N for its starting point.
+Everywhere `p` is a problem of the stack, `i` a UAV, `j` a target or, as N + 1 + d, base d, and `at` where the
+UAV is: ``START``, such a stop, or N where it has landed for good.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ BARRED = 8
 COMMITTED_ELSEWHERE = 9
 TOO_LONG_ALOFT = 10
 HOME_TOO_LATE = 11
+RELOADED = 12
 
 RULES = {
     RETURNING: "a returning UAV gets no more targets",
@@ -57,17 +59,30 @@ RULES = {
     NO_SUCH_ACTION: "there is no such action",
     TOO_MANY_STEPS: "the plan has more rows than max_steps",
     TOO_MUCH: "it would unload more than the UAV carries or the area needs",
-    BARRED: "no way leads there, or home from there, or the UAV lacks a skill or is excluded",
+    BARRED: "no way leads there, or home from there, or the UAV lacks a skill or may not be sent there",
     COMMITTED_ELSEWHERE: "another visit that the UAV is committed to comes first",
     TOO_LONG_ALOFT: "the visit, and the way home where it is required, exceed the endurance",
     HOME_TOO_LATE: "it would land after available_until",
+    RELOADED: "it has just reloaded",
 }
 """Rules that an action can break, in words."""
 
 
 @inlined
+def is_base(arrays: ProblemArrays, j: int) -> bool:
+    """Whether a stop is a base."""
+    return j > arrays.need.shape[1]
+
+
+@inlined
+def is_unlimited(arrays: ProblemArrays, j: int) -> bool:
+    """Whether a stop is a base with as much as is asked for: there nobody takes from others."""
+    return is_base(arrays, j) and arrays.stock[0, j - arrays.need.shape[1] - 1, 0] == np.inf
+
+
+@inlined
 def leg(arrays: ProblemArrays, p: int, i: int, at: int, j: int) -> float:
-    """Length of the leg to a target, over ground (rule 1)."""
+    """Length of the leg to a stop, over ground (rule 1)."""
     return (
         arrays.start_target[p, i, j] if at == START else arrays.between[p, arrays.uavs[p, i].leg_class, at, j]
     )
@@ -75,7 +90,7 @@ def leg(arrays: ProblemArrays, p: int, i: int, at: int, j: int) -> float:
 
 @inlined
 def leg_time(arrays: ProblemArrays, p: int, i: int, at: int, j: int, length: float) -> float:
-    """Time of the leg to a target, whose length is known (rule 1)."""
+    """Time of the leg to a stop, whose length is known (rule 1)."""
     if not arrays.terms[p].timed:
         time = length / arrays.uavs[p, i].speed
     elif at == START:
@@ -94,7 +109,7 @@ def air_length(arrays: ProblemArrays, p: int, i: int, length: float, time: float
 
 @inlined
 def way_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
-    """Length of the leg to the UAV's starting point; 0 where there is none."""
+    """Length of the leg to where the UAV lands; 0 where there is none."""
     if at == START:
         distance = arrays.uavs[p, i].start_home
     elif at == arrays.need.shape[1]:
@@ -106,7 +121,7 @@ def way_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
 
 @inlined
 def time_home(arrays: ProblemArrays, p: int, i: int, at: int) -> float:
-    """Time until the UAV has landed, by the leg to its starting point where it must return."""
+    """Time until the UAV has landed, by the leg to where it lands, if it must return."""
     if not arrays.terms[p].return_to_base or at == arrays.need.shape[1]:
         time = 0.0
     elif not arrays.terms[p].timed:
@@ -165,43 +180,46 @@ def aloft_after(
     arrays: ProblemArrays,
     p: int,
     i: int,
-    first: bool,
+    at: int,
     aloft: float,
     clock: float,
     arrival: float,
     end: float,
     j: int,
 ) -> float:
-    """Time in the air at the end of a visit (rule 3); a flight that begins with it waits on the ground.
+    """Time in the air at the end of a visit, or on arrival at a base (rule 3).
+
+    A flight that begins with a visit waits on the ground.
 
     Parameters
     ----------
-    arrays, p, i
-        As everywhere.
-    first
-        Whether it is the UAV's first visit.
+    arrays, p, i, at
+        As everywhere; `at` is where it sets out.
     aloft, clock
         Time in the air, and clock, when the UAV sets out.
     arrival, end
         When it arrives, and when the visit has ended.
     j
-        The target.
+        The target, or base.
     """
-    time = aloft + (end - clock)
-    if first and arrays.uavs[p, i].on_ground:
-        time -= max(0.0, arrays.areas[p, j].earliest - arrival)
+    if is_base(arrays, j):
+        time = aloft + (arrival - clock)
+    else:
+        time = aloft + (end - clock)
+        if is_base(arrays, at) or (at == START and arrays.uavs[p, i].on_ground):
+            time -= max(0.0, arrays.areas[p, j].earliest - arrival)
     return time
 
 
 @inlined
 def exceeds_endurance(arrays: ProblemArrays, p: int, i: int, j: int, aloft: float) -> bool:
-    """Whether a visit exceeds the endurance (rule 2), by the time in the air at its end."""
+    """Whether a stop exceeds the endurance (rule 2), by :func:`aloft_after`."""
     return aloft + time_home(arrays, p, i, j) > farthest(arrays.uavs[p, i].endurance)
 
 
 @inlined
 def lands_late(arrays: ProblemArrays, p: int, i: int, j: int, end: float) -> bool:
-    """Whether a UAV would land after ``available_until`` (rule 2), by the clock at the end of a visit."""
+    """Whether a UAV would land after ``available_until`` (rule 2), by the clock at the end of a stop."""
     return end + time_home(arrays, p, i, j) > latest(arrays.uavs[p, i].until)
 
 
@@ -234,8 +252,12 @@ def begin_after(arrays: ProblemArrays, p: int, j: int, arrival: float) -> float:
 
 @inlined
 def departure_after(arrays: ProblemArrays, p: int, j: int, arrival: float) -> float:
-    """Time at which a visit has ended (rule 3)."""
-    return begin_after(arrays, p, j, arrival) + arrays.areas[p, j].service
+    """Time at which a visit, or the turnaround at a base, has ended (rule 3)."""
+    if is_base(arrays, j):
+        end = arrival + arrays.bases[p, j - arrays.need.shape[1] - 1].turnaround
+    else:
+        end = begin_after(arrays, p, j, arrival) + arrays.areas[p, j].service
+    return end
 
 
 @inlined
@@ -253,73 +275,32 @@ def left_of(amount: float, taken: float, whole: float) -> float:
     amount, taken
         What there was, and what is taken from it.
     whole
-        What the amount is a part of: the first load, or what was requested.
+        What the amount is a part of: :func:`most_carried`, or what was requested.
     """
     left = amount - taken
     return left if left >= ROUNDING * whole else 0.0
 
 
 @inlined
-def earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
-    """Satisfaction that an amount unloaded at a target brings (rule 5), all of it beyond the first share.
-
-    Its need is not nothing. To it comes :func:`bonus_of`, material by material, and time takes some of both
-    (:func:`discount`).
-    """
-    if arrays.terms[p].bonus == 0.0:
-        earned = arrays.areas[p, j].level * amount / arrays.areas[p, j].need_total
-    else:
-        earned = arrays.areas[p, j].unit * amount
-    return earned
+def most_carried(arrays: ProblemArrays, p: int, i: int, k: int) -> float:
+    """Most of a material that a UAV carries: at first, or when it leaves a base."""
+    return max(arrays.load[p, i, k], arrays.full[p, i, k])
 
 
 @inlined
-def bonus_of(arrays: ProblemArrays, p: int, j: int, k: int, need: float, amount: float) -> float:
-    """What an amount of a material earns above :func:`earned_by`, as far as it is of the first share."""
-    first = min(amount, max(0.0, need - arrays.beyond[p, j, k]))
-    return arrays.terms[p].bonus * arrays.areas[p, j].unit * first
+def most_ever(arrays: ProblemArrays, p: int, i: int, k: int) -> float:
+    """Most of a material that a UAV may carry: at first, or after a reload at a base that it may use."""
+    most = arrays.load[p, i, k]
+    for d in range(arrays.stock.shape[1]):
+        if arrays.kept_range[p, i, arrays.need.shape[1] + 1 + d] < UNREACHABLE:
+            most = max(most, min(arrays.full[p, i, k], arrays.stock[p, d, k]))
+    return most
 
 
 @inlined
-def most_earned_by(arrays: ProblemArrays, p: int, j: int, amount: float) -> float:
-    """Satisfaction that an amount unloaded at a target brings at most, at whatever time."""
-    return earned_by(arrays, p, j, amount) * (1.0 + arrays.terms[p].bonus)
-
-
-@inlined
-def has_bonus(arrays: ProblemArrays, p: int) -> bool:
-    """Whether the first share of a need earns more than the rest."""
-    return arrays.terms[p].bonus != 0.0
-
-
-@inlined
-def decays(arrays: ProblemArrays, p: int) -> bool:
-    """Whether what a delivery earns falls with time."""
-    return arrays.terms[p].decay != 0.0
-
-
-@inlined
-def discount(arrays: ProblemArrays, p: int, begin: float) -> float:
-    """Share that is left of what a delivery earns at a time (rule 5)."""
-    return 2.0 ** (-begin * arrays.terms[p].decay) if decays(arrays, p) else 1.0
-
-
-@inlined
-def cost_of(arrays: ProblemArrays, p: int, distance: float) -> float:
-    """Reward that a distance costs (rule 5)."""
-    return arrays.terms[p].weight * distance
-
-
-@inlined
-def has_closing_cost(arrays: ProblemArrays, p: int) -> bool:
-    """Whether reward is lost for what is known at the end alone: the makespan, and changes."""
-    return arrays.terms[p].makespan != 0.0 or arrays.terms[p].change != 0.0
-
-
-@inlined
-def closing_cost(arrays: ProblemArrays, p: int, makespan: float, changes: float) -> float:
-    """Reward lost for the makespan and for changes (section 10)."""
-    return arrays.terms[p].makespan * makespan + arrays.terms[p].change * changes
+def loaded_of(load: float, full: float, stock: float) -> float:
+    """What a reload takes of a material, with what is aboard, what it leaves with, and what is in stock."""
+    return max(0.0, min(full - load, stock))
 
 
 @inlined
@@ -334,14 +315,15 @@ def reach_rule(
     clock: float,
     aloft: float,
 ) -> int:
-    """All of rule 2 but whether something is unloaded: ``ALLOWED``, or the rule that forbids a visit.
+    """All of rule 2 but whether something is unloaded: ``ALLOWED``, or the rule that forbids a stop.
 
     Parameters
     ----------
     arrays, p, i, at, j
         As everywhere.
     visits
-        How many visits the UAV has made; ``FREE`` before the first, whatever it is committed to.
+        How many stops the UAV has made, all of which are visits as long as it is committed to some;
+        ``FREE`` before the first, whatever it is committed to.
     flown, clock, aloft
         Air length, clock, and time in the air when it sets out.
     """
@@ -350,40 +332,20 @@ def reach_rule(
     rule = ALLOWED
     if is_out_of_range(arrays, p, i, j, flown + air_length(arrays, p, i, length, time)):
         rule = BARRED if is_barred(arrays, p, i, at, j) else OUT_OF_RANGE
-    elif is_late(clock + time, arrays.areas[p, j].deadline):
+    elif not is_base(arrays, j) and is_late(clock + time, arrays.areas[p, j].deadline):
         rule = TOO_LATE
     elif visits != FREE and is_committed_elsewhere(arrays, p, i, visits, j):
         rule = COMMITTED_ELSEWHERE
+    elif is_base(arrays, j) and is_base(arrays, at):
+        rule = RELOADED
     elif is_watched(arrays, p, i):
         end = departure_after(arrays, p, j, clock + time)
-        in_air = aloft_after(arrays, p, i, visits <= 0, aloft, clock, clock + time, end, j)
+        in_air = aloft_after(arrays, p, i, at, aloft, clock, clock + time, end, j)
         if exceeds_endurance(arrays, p, i, j, in_air):
             rule = TOO_LONG_ALOFT
         elif lands_late(arrays, p, i, j, end):
             rule = HOME_TOO_LATE
     return rule
-
-
-def worths(arrays: ProblemArrays) -> Floats:
-    """Return what a unit of material earns at most at each target, (N,); 0 where none is needed."""
-    needed = arrays.areas["need_total"][0] > 0
-    if arrays.terms["bonus"][0] != 0.0:
-        first = (arrays.need[0] > arrays.beyond[0]).any(axis=1)
-        return np.where(needed, arrays.areas["unit"][0] * (1.0 + arrays.terms["bonus"][0] * first), 0.0)
-    return np.where(needed, arrays.areas["level"][0], 0.0) / np.where(
-        needed, arrays.areas["need_total"][0], 1.0
-    )
-
-
-def worth_by_material(arrays: ProblemArrays) -> Floats:
-    """Return what the need of each material earns at most where the first share earns more, (N, K).
-
-    That is as if all of a need were of the first share, as long as any of it is: any part of the need earns
-    at most that part of it.
-    """
-    need = arrays.need[0]
-    first = np.where(need > arrays.beyond[0], 1.0 + arrays.terms["bonus"][0], 1.0)
-    return arrays.areas["unit"][0][:, None] * need * first
 
 
 def limits(arrays: ProblemArrays, tolerance: float = TOLERANCE) -> tuple[Floats, Floats]:
@@ -398,13 +360,16 @@ def first_visits(arrays: ProblemArrays, tolerance: float = TOLERANCE) -> Flags:
     """Return which UAV of a problem can be at which target in range and in time if it flies there first.
 
     Whatever it unloads. No way there is shorter, so no other visit is allowed in any plan. Where a way over
-    a third place may be shorter, the least that it could be counts.
+    a third place may be shorter, the least that it could be counts; where it may reload on the way, whatever
+    is not barred.
 
     Returns
     -------
     Flags
         (M, N).
     """
+    if arrays.n_bases:
+        return np.asarray(arrays.kept_range[0, :, : arrays.shape[1]] < UNREACHABLE)
     speed, timed = arrays.uavs["speed"][0][:, None], bool(arrays.terms["timed"][0])
     length = arrays.start_target[0]
     time = arrays.start_time[0] if timed else length / speed

@@ -7,6 +7,7 @@ from functools import cached_property
 from app.domain.allocation import Path
 from app.domain.geometry import distance
 from app.domain.problem import Problem
+from app.simulation.homes import AT_START
 from app.simulation.legs import places_of, zones_of
 from app.simulation.visit import START
 from app.travel.around_zones import LegsAroundZones
@@ -27,7 +28,7 @@ class Ways:
         self._places = places_of(problem)
 
     def to(self, i: int, at: int, j: int, length: float) -> Path | None:
-        """Return the points that UAV `i` flies over from where it is to target `j`.
+        """Return the points that UAV `i` flies over from where it is to stop `j`.
 
         Parameters
         ----------
@@ -41,17 +42,20 @@ class Ways:
         tuple
             None where the way is a straight line, or is not known.
         """
-        return self._between(i, self._place(i, at), self._target(j), length)
+        return self._between(i, self._place(i, at), self._stop(j), length)
 
-    def home(self, i: int, at: int, length: float) -> Path | None:
-        """Return the same for its way from where it is to its starting point."""
-        return self._between(i, self._place(i, at), self._problem.n_uavs + i, length)
+    def home(self, i: int, at: int, base: int, length: float) -> Path | None:
+        """Return the same for its way home, to a base or, with ``AT_START``, its starting point."""
+        m, n = self._problem.n_uavs, self._problem.n_targets
+        home = m + i if base == AT_START else self._stop(n + 1 + base)
+        return self._between(i, self._place(i, at), home, length)
 
     def _place(self, i: int, at: int) -> int:
-        return i if at == START else self._target(at)
+        return i if at == START else self._stop(at)
 
-    def _target(self, j: int) -> int:
-        return 2 * self._problem.n_uavs + j
+    def _stop(self, j: int) -> int:
+        """Number of a stop among the places: no place is there for N, which sends a UAV home."""
+        return 2 * self._problem.n_uavs + j - (j > self._problem.n_targets)
 
     def _between(self, i: int, origin: int, destination: int, length: float) -> Path | None:
         problem = self._problem

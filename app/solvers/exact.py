@@ -5,7 +5,8 @@ from __future__ import annotations
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.evaluation import reward_of
-from app.solvers.bound.instance import new_instance
+from app.solvers.bound.enumeration import Enumeration
+from app.solvers.bound.instance import Instance, new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree
 from app.solvers.bound.upper_bound import bound_without_sets, enumerate_sets, sets_are_few
@@ -23,11 +24,16 @@ _SEARCH_SHARE_LARGE = 0.6
 """The same where target sets are too many, so that only the search makes the plan better."""
 
 
+_ACTIONS_A_NODE = 500
+"""Actions that stand for a node where all plans are flown: about as much work."""
+
+
 class Exact:
     """A :class:`~app.solvers.protocol.Solver` for greedy unloading; an epoch is a node of the search tree.
 
     Branch and bound with the bounds of :mod:`app.solvers.bound`, from the local search's plan. Where a node
-    has few plans left that could be better, the simulator flies them all.
+    has few plans left that could be better, the simulator flies them all; with reloads it flies all plans of
+    a tiny problem.
     """
 
     def __init__(self, parameters: ExactParameters, context: SolverContext) -> None:
@@ -38,7 +44,7 @@ class Exact:
         """See :class:`~app.solvers.protocol.Solver`; the solution has a proof."""
         instance = new_instance(problem)
         few = sets_are_few(instance)
-        share = _SEARCH_SHARE if few else _SEARCH_SHARE_LARGE
+        share = _SEARCH_SHARE if few or problem.bases else _SEARCH_SHARE_LARGE
 
         def searching(progress: Progress) -> None:
             report(Progress(share * progress.fraction, 0, progress.best_reward, progress.incumbent))
@@ -50,6 +56,8 @@ class Exact:
         reward = reward_of(problem, plan)
         history = History()
         history.add(0, reward)
+        if problem.bases:
+            return self._by_enumeration(problem, instance, plan, history, stop, share, report)
         lower = reward / instance.scale
         sets = enumerate_sets(instance, stop)
         if sets is None:
@@ -73,6 +81,34 @@ class Exact:
         if history.epoch[-1] < tree.nodes:
             history.add(tree.nodes, reward)
         bound = max(reward, tree.bound * instance.scale)
+        return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
+
+    def _by_enumeration(
+        self,
+        problem: Problem,
+        instance: Instance,
+        plan: Plan,
+        history: History,
+        stop: StopCriterion,
+        share: float,
+        report: Report,
+    ) -> Solution:
+        """Fly all plans of a tiny problem, and bound those of another one."""
+        reward = history.reward[-1]
+        plans = Enumeration(instance.arrays, reward)
+        most = self.parameters.nodes
+        for node in range(1, most + 1):
+            if plans.complete or stop():
+                break
+            plans.run(stop, node * _ACTIONS_A_NODE)
+            if plans.actions is not None:
+                plan = Plan.of(plans.actions, problem.n_targets)
+                reward, plans.actions = reward_of(problem, plan), None
+                history.add(node, reward)
+            report(Progress(share + (1.0 - share) * node / most, node, reward, plan))
+        bound = reward
+        if not plans.complete:
+            bound = max(reward, bound_without_sets(instance, reward / instance.scale, stop) * instance.scale)
         return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
 
 

@@ -131,7 +131,8 @@ def _begin(
     for first, last in slices:
         if first > 0 and stop():
             return False
-        population[first:last] = rng.integers(0, home + 1, population[first:last].shape)
+        actions = home + 1 + flight.arrays.n_bases
+        population[first:last] = rng.integers(0, actions, population[first:last].shape)
         if first == 0:
             # Flying nowhere is a plan too: the answer is legal and earns 0 however early it must stop.
             population[0] = home
@@ -182,7 +183,7 @@ def decode(flight: Flight, genes: Integers) -> float:
     flight
         Scratch space.
     genes
-        (S, M); column i is UAV i's list of targets, N ends it.
+        (S, M); column i is UAV i's list of targets and bases, N ends it.
     """
     arrays, episodes = flight.arrays, flight.episodes
     home = arrays.need.shape[1]
@@ -274,7 +275,7 @@ def breed(
     """
     crossover_rate, mutation_rate = rates
     _, steps, m = population.shape
-    home = flight.arrays.need.shape[1]
+    actions = flight.arrays.need.shape[1] + 1 + flight.arrays.stock.shape[1]
     if first == 0:
         best = fittest(fitness)
         children[0], child_fitness[0] = population[best], fitness[best]
@@ -286,7 +287,7 @@ def breed(
             parent = mother if rng.random() < 0.5 else father
             for s in range(steps):
                 redrawn = rng.random() < mutation_rate
-                children[c, s, i] = rng.integers(0, home + 1) if redrawn else parent[s, i]
+                children[c, s, i] = rng.integers(0, actions) if redrawn else parent[s, i]
         child_fitness[c] = decode(flight, children[c])
 
 

@@ -88,7 +88,7 @@ def test_totals_stay_those_of_the_simulator_through_random_moves():
             apply(search.arrays, search.routes, search.change, extra, closing)
             applied += 1
             if rng.random() < 0.4:
-                undo(search.routes, search.change)
+                undo(search.arrays, search.routes, search.change)
                 undone += 1
             useless += search.routes.total[USELESS] > 0.5
             assert_evaluated(search)
@@ -115,7 +115,7 @@ def test_undoing_leaves_no_trace():
             )
             if rng.random() < 0.3:
                 continue
-            undo(search.routes, search.change)
+            undo(search.arrays, search.routes, search.change)
             assert np.array_equal(search.routes.length, lengths)
             for name, now, then in zip(search.routes._fields, search.routes, before, strict=True):
                 if name in ("first", "total"):

@@ -11,7 +11,16 @@ from app.learning.paper.architecture import NetworkSizes
 from app.learning.paper.environment import swarm_sizes
 from app.learning.paper.observations import Float32s, features_of, write_states
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, compile_problem
-from app.simulation.simulator import Episodes, act, compiled, end_step, new_episodes, reset, verdict
+from app.simulation.simulator import (
+    Episodes,
+    act,
+    compiled,
+    copy_episode,
+    end_step,
+    new_episodes,
+    reset,
+    verdict,
+)
 from app.simulation.visit import ALLOWED
 
 MAX_JOINT_ACTIONS = 20_000
@@ -38,24 +47,6 @@ def count_joint_actions(problem: Problem) -> int:
 
 
 @compiled
-def _copy(episodes: Episodes, source: int, scratch: Episodes, row: int) -> None:
-    for i in range(episodes.at.shape[1]):
-        scratch.at[row, i] = episodes.at[source, i]
-        scratch.flown[row, i] = episodes.flown[source, i]
-        scratch.clock[row, i] = episodes.clock[source, i]
-        scratch.aloft[row, i] = episodes.aloft[source, i]
-        scratch.visits[row, i] = episodes.visits[source, i]
-        scratch.ret[row, i] = episodes.ret[source, i]
-        for k in range(episodes.load.shape[2]):
-            scratch.load[row, i, k] = episodes.load[source, i, k]
-    for j in range(episodes.need.shape[1]):
-        for k in range(episodes.need.shape[2]):
-            scratch.need[row, j, k] = episodes.need[source, j, k]
-    scratch.satisfaction[row] = episodes.satisfaction[source]
-    scratch.distance[row] = episodes.distance[source]
-
-
-@compiled
 def allowed_joint_actions(
     arrays: ProblemArrays, episodes: Episodes, scratch: Episodes, actions: Integers, out: Flags
 ) -> None:
@@ -76,7 +67,7 @@ def allowed_joint_actions(
     """
     m, home = episodes.at.shape[1], arrays.need.shape[1]
     out[:] = False
-    _copy(episodes, 0, scratch, 0)
+    copy_episode(episodes, 0, scratch, 0)
     depth, index = 0, 0
     actions[0] = -1
     while depth >= 0:
@@ -91,7 +82,7 @@ def allowed_joint_actions(
         if depth == m - 1:
             out[index * (home + 1) + action] = True
             continue
-        _copy(scratch, depth, scratch, depth + 1)
+        copy_episode(scratch, depth, scratch, depth + 1)
         act(arrays, scratch, depth + 1, depth, action)
         index = index * (home + 1) + action
         depth += 1

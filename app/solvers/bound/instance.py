@@ -8,7 +8,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.simulation.arrays import Flags, Floats, ProblemArrays, compile_problem
-from app.simulation.visit import worth_by_material
+from app.simulation.worth import worth_by_material
 from app.solvers.scale import largest_level
 
 _DIGITS = 2.0**38
@@ -29,7 +29,7 @@ class Instance(NamedTuple):
     need
         (N, K) amounts needed.
     load
-        (M, K) amounts carried.
+        (M, K) amounts that a UAV may bring in all: what it carries, and what it may load at bases.
     price
         Cost of a unit of distance, λ / scale.
     idle
@@ -54,7 +54,7 @@ class Instance(NamedTuple):
 def new_instance(problem: Problem) -> Instance:
     """Scale a problem."""
     arrays = compile_problem(problem)
-    need, load = arrays.need[0], arrays.load[0]
+    need, load = arrays.need[0], _brought(arrays)
     wanted = arrays.areas["need_total"][0] > 0
     scale = largest_level(arrays)
     if arrays.terms["bonus"][0] == 0.0:
@@ -71,9 +71,24 @@ def new_instance(problem: Problem) -> Instance:
     return Instance(arrays, scale, worth, need, load, price, idle, _is_exact(arrays), useful)
 
 
+def _brought(arrays: ProblemArrays) -> Floats:
+    """Return the amounts that each UAV may bring in all, (M, K); no reload follows another."""
+    if not arrays.n_bases:
+        return arrays.load[0]
+    reloads = (int(arrays.max_steps[0]) + 1) // 2
+    return arrays.load[0] + np.minimum(reloads * arrays.full[0], arrays.stock[0].sum(axis=0))
+
+
 def _is_exact(arrays: ProblemArrays) -> bool:
     terms, uavs = arrays.terms[0], arrays.uavs[0]
-    left_out = terms["decay"] or terms["bonus"] or terms["makespan"] or terms["change"] or terms["timed"]
+    left_out = (
+        arrays.n_bases
+        or terms["decay"]
+        or terms["bonus"]
+        or terms["makespan"]
+        or terms["change"]
+        or terms["timed"]
+    )
     waits = arrays.areas["earliest"][0].any() or uavs["watched"].any() or arrays.committed.size
     return not (left_out or waits or not terms["metric"])
 

@@ -92,7 +92,9 @@ def bound_without_sets(instance: Instance, lower: float, stop: StopCriterion) ->
 
 
 def sets_are_few(instance: Instance) -> bool:
-    """Say whether the target sets of all UAVs are few enough to be enumerated."""
+    """Say whether the target sets of all UAVs are few enough to be enumerated; with reloads never."""
+    if instance.arrays.n_bases:
+        return False
     return instance.need.shape[0] <= MAX_TARGETS and count_sets(instance) <= MOST_SETS
 
 

@@ -105,17 +105,17 @@ def _earnings(
 def _shortest_legs(instance: Instance) -> Floats:
     """Return the least a visit costs, (M, N); infinite where it is not possible at all."""
     arrays = instance.arrays
-    legs = _nearest_legs(arrays.start_target[0], arrays.between[0].min(axis=0))
+    legs = _nearest_legs(arrays.start_target[0], arrays.between[0].min(axis=0), arrays.shape[1])
     possible = instance.useful & first_visits(arrays, SLACK)
     return np.where(possible, instance.price * legs, np.inf)
 
 
 @njit(cache=True, error_model="numpy")
-def _nearest_legs(start: Floats, between: Floats) -> Floats:
-    """Return the shortest leg that ends at a target and a UAV can fly: from its place or another target."""
-    m, n = start.shape
+def _nearest_legs(start: Floats, between: Floats, n: int) -> Floats:
+    """Return the shortest leg to each of n targets that a UAV can fly: from its place or another stop."""
+    m = start.shape[0]
     nearest = np.full(n, np.inf)
-    for j in range(n):
+    for j in range(between.shape[0]):
         for k in range(n):
             if k != j:
                 nearest[k] = min(nearest[k], between[j, k])

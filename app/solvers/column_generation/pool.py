@@ -62,7 +62,12 @@ class Pool(NamedTuple):
 
 
 def often_whole(arrays: ProblemArrays) -> bool:
-    """Whether most UAVs carry enough for most targets, so that combining routes is worth its time."""
+    """Whether most UAVs carry enough for most targets, so that combining routes is worth its time.
+
+    Routes with reloads are not combined.
+    """
+    if arrays.n_bases:
+        return False
     active, wanted = ~arrays.ret[0], arrays.areas["need_total"][0] > 0
     load, need = arrays.load[0][active], arrays.need[0][wanted]
     if not (len(load) and len(need)):
@@ -74,8 +79,13 @@ def often_whole(arrays: ProblemArrays) -> bool:
 
 
 def always_whole(arrays: ProblemArrays) -> bool:
-    """Whether every route is whole: each UAV that flies carries enough for all that it can visit."""
-    return bool((arrays.load[0][~arrays.ret[0]] >= largest_needs(arrays)[None, :]).all())
+    """Whether every route is whole: each UAV that flies carries enough for all that it can visit.
+
+    Routes with reloads are none.
+    """
+    return not arrays.n_bases and bool(
+        (arrays.load[0][~arrays.ret[0]] >= largest_needs(arrays)[None, :]).all()
+    )
 
 
 def largest_needs(arrays: ProblemArrays) -> Floats:

@@ -22,7 +22,9 @@ from app.solvers.local_search.change import (
     propose,
     undo,
 )
-from app.solvers.local_search.moves import Neighbourhood, draw_move, neighbourhood
+from app.solvers.local_search.flights import is_reload
+from app.solvers.local_search.moves import draw_move
+from app.solvers.local_search.neighbourhood import Neighbourhood, neighbourhood
 from app.solvers.local_search.routes import (
     CLOSING,
     DISTANCE,
@@ -103,7 +105,7 @@ def set_routes(search: Search, actions: Integers) -> None:
     home = search.arrays.areas["level"].shape[1]
     for i in range(actions.shape[1]):
         targets = actions[:, i]
-        set_route(search, i, np.ascontiguousarray(targets[targets < home]))
+        set_route(search, i, np.ascontiguousarray(targets[targets != home]))
     keep_best(search)
 
 
@@ -167,15 +169,51 @@ def drop_useless(search: Search) -> None:
                 if not routes.useless[s * m + i]:
                     s += 1
                     continue
-                change.uav[1] = NONE
-                for q in range(s, routes.length[i] - 1):
-                    change.target[0, q] = routes.target[i, q + 1]
-                propose(routes, change, 0, i, s, routes.length[i] - 1)
-                # Mostly the way without it is not longer, so it is feasible; otherwise the route ends here.
-                if not feasible(arrays, change):
-                    propose(routes, change, 0, i, s, s)
+                # Mostly the way without it is not longer, so it is feasible; alone between two reloads it
+                # takes one of them along. Otherwise the route ends here.
+                gone = 1
+                while not _is_feasible_without(arrays, routes, change, i, s, gone):
+                    gone = 2 if gone == 1 and _is_before_reload(search, i, s) else routes.length[i] - s
                 _apply_whole(arrays, routes, change)
+    _drop_last_reloads(search)
     keep_best(search)
+
+
+@compiled
+def _is_before_reload(search: Search, i: int, s: int) -> bool:
+    return s + 1 < search.routes.length[i] and is_reload(search.routes, search.near, i, s + 1)
+
+
+@compiled
+def _is_feasible_without(
+    arrays: ProblemArrays, routes: Routes, change: Change, i: int, s: int, gone: int
+) -> bool:
+    """Propose the route of UAV `i` without some stops from `s` on, and say whether rule 2 allows it."""
+    change.uav[1] = NONE
+    for q in range(s, routes.length[i] - gone):
+        change.target[0, q] = routes.target[i, q + gone]
+    propose(routes, change, 0, i, s, routes.length[i] - gone)
+    return feasible(arrays, change)
+
+
+@compiled
+def _drop_last_reloads(search: Search) -> None:
+    """Take reloads off the ends of routes, unless the plan earns more with them."""
+    arrays, routes, change = search.arrays, search.routes, search.change
+    if arrays.stock.shape[1] == 0:
+        return
+    weight = arrays.terms[0].weight
+    for i in range(routes.length.shape[0]):
+        length = routes.length[i]
+        if length == 0 or not is_reload(routes, search.near, i, length - 1):
+            continue
+        if not _is_feasible_without(arrays, routes, change, i, length - 1, 1):
+            continue
+        _apply_whole(arrays, routes, change)
+        cost, was = weight * routes.total[DISTANCE] + routes.total[CLOSING], change.total
+        less = was[SATISFACTION] - weight * was[DISTANCE] - was[CLOSING] - routes.total[SATISFACTION] + cost
+        if routes.total[USELESS] > was[USELESS] or less > ROUNDING * (was[SATISFACTION] + cost):
+            undo(arrays, routes, change)
 
 
 @compiled_nogil
@@ -236,5 +274,5 @@ def anneal(
                     if i != NONE:
                         collect(arrays, pool, i, routes.target[i], routes.length[i], routes.flown[i])
         else:
-            undo(routes, change)
+            undo(arrays, routes, change)
     return kept

@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
+from app.simulation.heap import pop, push
 from app.simulation.simulator import compiled
-from app.simulation.visit import (
+from app.simulation.visit import is_base, left_of, loaded_of, most_carried
+from app.simulation.worth import (
     bonus_of,
     closing_cost,
     decays,
@@ -21,7 +23,6 @@ from app.simulation.visit import (
     earned_by,
     has_bonus,
     has_closing_cost,
-    left_of,
 )
 from app.solvers.local_search.routes import (
     CLOSING,
@@ -200,14 +201,14 @@ def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float, c
         change.total[c] = routes.total[c]
     routes.total[DISTANCE] += extra
     routes.total[CLOSING] += closing
-    _take_out(routes, change)
+    _take_out(arrays, routes, change)
     _exchange(routes, change)
     for side in range(2):
         i = change.uav[side]
         if i != NONE:
             for s in range(change.begin[side], routes.length[i]):
                 slot = s * m + i
-                link(routes, slot, routes.target[i, s])
+                link(arrays, routes, slot, routes.target[i, s])
                 _record(routes, change, slot)
                 # What was here before is gone: an impossible load makes sure that the visit is worked out.
                 routes.load[slot, 0] = -1.0
@@ -219,20 +220,20 @@ def apply(arrays: ProblemArrays, routes: Routes, change: Change, extra: float, c
 
 
 @compiled
-def undo(routes: Routes, change: Change) -> None:
+def undo(arrays: ProblemArrays, routes: Routes, change: Change) -> None:
     """Take the last applied change back."""
     m = routes.length.shape[0]
     for side in range(2):
         i = change.uav[side]
         if i != NONE:
             for s in range(change.begin[side], routes.length[i]):
-                unlink(routes, s * m + i, routes.target[i, s])
+                unlink(arrays, routes, s * m + i, routes.target[i, s])
     _exchange(routes, change)
     for side in range(2):
         i = change.uav[side]
         if i != NONE:
             for s in range(change.begin[side], routes.length[i]):
-                link(routes, s * m + i, routes.target[i, s])
+                link(arrays, routes, s * m + i, routes.target[i, s])
     for q in range(change.journal_length[0] - 1, -1, -1):
         slot = change.journal[q]
         for k in range(routes.load.shape[1]):
@@ -245,7 +246,7 @@ def undo(routes: Routes, change: Change) -> None:
 
 
 @compiled
-def _take_out(routes: Routes, change: Change) -> None:
+def _take_out(arrays: ProblemArrays, routes: Routes, change: Change) -> None:
     """Remove the visits that may differ, last first, and queue what followed each at its target."""
     m, steps = routes.target.shape
     for s in range(steps - 1, -1, -1):
@@ -255,7 +256,7 @@ def _take_out(routes: Routes, change: Change) -> None:
             i = change.uav[side]
             if i != NONE and change.begin[side] <= s < routes.length[i]:
                 slot = s * m + i
-                follower = unlink(routes, slot, routes.target[i, s])
+                follower = unlink(arrays, routes, slot, routes.target[i, s])
                 if follower != NONE:
                     _enqueue(change, follower)
                 routes.total[SATISFACTION] -= routes.earned[slot]
@@ -291,7 +292,7 @@ def _exchange(routes: Routes, change: Change) -> None:
 
 @compiled
 def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) -> None:
-    """Work out what a visit unloads; queue the visits that depend on it if anything is new."""
+    """Work out what a stop unloads or loads; queue those that depend on it if anything is new."""
     m, materials = routes.length.shape[0], routes.load.shape[1]
     i, s = slot % m, slot // m
     j = routes.target[i, s]
@@ -309,17 +310,18 @@ def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) 
         routes.total[SATISFACTION] -= routes.earned[slot]
         if routes.useless[slot]:
             routes.total[USELESS] -= 1.0
-    earned, useless = 0.0, True
+    base = is_base(arrays, j)
+    earned, useless = 0.0, not base
     for k in range(materials):
         load, need = _load(arrays, routes, i, slot, k), _need(arrays, routes, j, before, k)
         routes.load[slot, k], routes.need[slot, k] = load, need
-        unloaded = min(load, need)
+        unloaded = 0.0 if base else min(load, need)
         if unloaded > 0.0:
             useless = False
             earned += earned_by(arrays, 0, j, unloaded)
             if has_bonus(arrays, 0):
                 earned += bonus_of(arrays, 0, j, k, need, unloaded)
-    if decays(arrays, 0):
+    if decays(arrays, 0) and not base:
         earned *= discount(arrays, 0, routes.clock[i, s + 1] - arrays.areas[0, j].service)
     routes.earned[slot], routes.useless[slot] = earned, useless
     routes.total[SATISFACTION] += earned
@@ -333,17 +335,25 @@ def _work_out(arrays: ProblemArrays, routes: Routes, change: Change, slot: int) 
 
 @compiled
 def _load(arrays: ProblemArrays, routes: Routes, i: int, slot: int, k: int) -> float:
-    """What UAV `i` carries before a visit: what the visit before it left."""
-    earlier = slot - routes.length.shape[0]
+    """What UAV `i` carries before a stop: what the one before it left."""
+    m = routes.length.shape[0]
+    earlier = slot - m
     if earlier < 0:
         return arrays.load[0, i, k]
-    unloaded = min(routes.load[earlier, k], routes.need[earlier, k])
-    return left_of(routes.load[earlier, k], unloaded, arrays.load[0, i, k])
+    load = routes.load[earlier, k]
+    if is_base(arrays, routes.target[i, earlier // m]):
+        return load + loaded_of(load, arrays.full[0, i, k], routes.need[earlier, k])
+    return left_of(load, min(load, routes.need[earlier, k]), most_carried(arrays, 0, i, k))
 
 
 @compiled
 def _need(arrays: ProblemArrays, routes: Routes, j: int, before: int, k: int) -> float:
-    """What target `j` needs before a visit: what the visit before it there left."""
+    """What target `j` needs, or base `j` has, before a stop: what the one before it there left."""
+    if is_base(arrays, j):
+        if before == NONE:
+            return arrays.stock[0, j - arrays.need.shape[1] - 1, k]
+        full = arrays.full[0, before % routes.length.shape[0], k]
+        return routes.need[before, k] - loaded_of(routes.load[before, k], full, routes.need[before, k])
     if before == NONE:
         return arrays.need[0, j, k]
     unloaded = min(routes.load[before, k], routes.need[before, k])
@@ -365,34 +375,15 @@ def _record(routes: Routes, change: Change, slot: int) -> None:
 @compiled
 def _enqueue(change: Change, slot: int) -> None:
     """Put a slot on the heap, unless it is there."""
-    if change.queued[slot] == change.number[0]:
-        return
-    change.queued[slot] = change.number[0]
-    place = change.queue_length[0]
-    change.queue_length[0] = place + 1
-    while place > 0 and change.queue[(place - 1) // 2] > slot:
-        change.queue[place] = change.queue[(place - 1) // 2]
-        place = (place - 1) // 2
-    change.queue[place] = slot
+    if change.queued[slot] != change.number[0]:
+        change.queued[slot] = change.number[0]
+        push(change.queue, change.queue_length[0], slot)
+        change.queue_length[0] += 1
 
 
 @compiled
 def _pop(change: Change) -> int:
     """Take the earliest slot off the heap."""
-    top = change.queue[0]
-    length = change.queue_length[0] - 1
-    change.queue_length[0] = length
-    last = change.queue[length]
-    place = 0
-    while True:
-        child = 2 * place + 1
-        if child >= length:
-            break
-        if child + 1 < length and change.queue[child + 1] < change.queue[child]:
-            child += 1
-        if change.queue[child] >= last:
-            break
-        change.queue[place] = change.queue[child]
-        place = child
-    change.queue[place] = last
-    return top
+    slot = pop(change.queue, change.queue_length[0])
+    change.queue_length[0] -= 1
+    return slot

@@ -1,103 +1,18 @@
-"""The moves: each proposes new routes for one or two UAVs, drawn at random near what it starts from.
-
-Targets to fly to are drawn from lists of near targets, so that the cost of a move does not grow with N.
-"""
+"""The moves: each proposes new routes for one or two UAVs, drawn at random near what it starts from."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from app.simulation.arrays import NONE, Flags, Integers, ProblemArrays
+from app.simulation.arrays import NONE
 from app.simulation.simulator import compiled
-from app.simulation.visit import START, cost_of, earned_by, leg, way_home
 from app.solvers.local_search.change import Change, propose
+from app.solvers.local_search.flights import draw_flight_move
+from app.solvers.local_search.neighbourhood import Neighbourhood, draw, target_after
 from app.solvers.local_search.routes import Routes
 
-NEAR = 24
-"""Length of the lists of near targets."""
-
-FAR_SHARE = 0.05
-"""Probability that a target is drawn from all of them instead."""
-
-
-class Neighbourhood(NamedTuple):
-    """What the moves draw from.
-
-    Attributes
-    ----------
-    active
-        UAVs that may be sent, (A,).
-    wanted
-        Targets that need anything, (W,).
-    near_target
-        (N, L) the targets nearest to a target, itself left out.
-    near_start
-        (M, L) the targets nearest to where a UAV is.
-    reluctant
-        (M,) UAVs for which one visit alone, to some of these, earns less than its way costs.
-    """
-
-    active: Integers
-    wanted: Integers
-    near_target: Integers
-    near_start: Integers
-    reluctant: Flags
-
-
-def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
-    """Make the lists for the first problem of a stack; ``active`` or ``wanted`` may be empty."""
-    wanted = np.flatnonzero(arrays.areas["need_total"][0] > 0)
-    length = max(1, min(NEAR, len(wanted) - 1))
-    between = arrays.between[0].min(axis=0)
-    np.fill_diagonal(between, np.inf)
-    near_start = _nearest(arrays.start_target[0], wanted, length)
-    reluctant = np.zeros(len(near_start), np.bool_)
-    if len(wanted):
-        _find_reluctant(arrays, near_start, reluctant)
-    return Neighbourhood(
-        active=np.flatnonzero(~arrays.ret[0] & (arrays.load[0] > 0).any(axis=1)),
-        wanted=wanted,
-        near_target=_nearest(between, wanted, length),
-        near_start=near_start,
-        reluctant=reluctant,
-    )
-
-
-def _nearest(distance: np.ndarray, wanted: Integers, length: int) -> Integers:
-    """(rows, length) wanted columns of least distance, least first."""
-    if not len(wanted):
-        return np.zeros((len(distance), 1), np.int64)
-    among = distance[:, wanted]
-    if length < among.shape[1]:
-        part = np.argpartition(among, length - 1, axis=1)[:, :length]
-    else:
-        part = np.broadcast_to(np.arange(among.shape[1]), among.shape)
-    order = np.argsort(np.take_along_axis(among, part, axis=1), axis=1, kind="stable")
-    return np.ascontiguousarray(wanted[np.take_along_axis(part, order, axis=1)])
-
-
-@compiled
-def _find_reluctant(arrays: ProblemArrays, near_start: Integers, reluctant: Flags) -> None:
-    """Work out :attr:`Neighbourhood.reluctant`, all False before."""
-    for i in range(len(near_start)):
-        for j in near_start[i]:
-            unloaded = 0.0
-            for k in range(arrays.load.shape[2]):
-                unloaded += min(arrays.load[0, i, k], arrays.need[0, j, k])
-            way = leg(arrays, 0, i, START, j)
-            if arrays.terms[0].charge_return:
-                way += way_home(arrays, 0, i, j) - way_home(arrays, 0, i, START)
-            if unloaded > 0.0 and earned_by(arrays, 0, j, unloaded) < cost_of(arrays, 0, way):
-                reluctant[i] = True
-                break
-
-
-@compiled
-def draw(rng: np.random.Generator, n: int) -> int:
-    """Draw a number from 0..n-1."""
-    return int(rng.random() * n)
+FLIGHT_SHARE = 0.25
+"""Probability of a move about reloads, where there are bases."""
 
 
 @compiled
@@ -105,6 +20,8 @@ def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.rando
     """Propose a random move; False where what was drawn is not possible."""
     change.uav[0], change.uav[1] = NONE, NONE
     i = near.active[draw(rng, len(near.active))]
+    if near.near_base.shape[1] > 0 and rng.random() < FLIGHT_SHARE:
+        return draw_flight_move(routes, near, change, rng, i)
     kind = rng.random()
     if routes.length[i] == 0 and near.reluctant[i] and kind < 0.5:
         return _depart(routes, near, change, rng, i)
@@ -133,20 +50,9 @@ def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.rando
 
 
 @compiled
-def _target_after(routes: Routes, near: Neighbourhood, rng: np.random.Generator, i: int, s: int) -> int:
-    """Draw a target to fly to after the first `s` visits of UAV `i`; nearer ones more often."""
-    if rng.random() < FAR_SHARE:
-        return near.wanted[draw(rng, len(near.wanted))]
-    u = rng.random()
-    if s == 0:
-        return near.near_start[i, int(u * u * near.near_start.shape[1])]
-    return near.near_target[routes.target[i, s - 1], int(u * u * near.near_target.shape[1])]
-
-
-@compiled
 def _near_visit(routes: Routes, near: Neighbourhood, rng: np.random.Generator, i: int) -> int:
     """Draw a visit of another UAV near a visit of UAV `i`, as its slot; NONE where there is none."""
-    j = _target_after(routes, near, rng, i, draw(rng, routes.length[i] + 1))
+    j = target_after(routes, near, rng, i, draw(rng, routes.length[i] + 1))
     slot = routes.first[j]
     if slot == NONE:
         return NONE
@@ -161,7 +67,7 @@ def _insert(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.
     length, steps = routes.length[i], routes.target.shape[1]
     s = draw(rng, min(length + 1, steps))
     new = min(length + 1, steps)
-    change.target[0, s] = _target_after(routes, near, rng, i, s)
+    change.target[0, s] = target_after(routes, near, rng, i, s)
     for q in range(s + 1, new):
         change.target[0, q] = routes.target[i, q - 1]
     propose(routes, change, 0, i, s, new)
@@ -172,7 +78,7 @@ def _insert(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.
 def _depart(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int) -> bool:
     """A whole route for a UAV that has none: where one visit does not pay for the way, several may."""
     length = 1 + draw(rng, routes.target.shape[1])
-    change.target[0, 0] = _target_after(routes, near, rng, i, 0)
+    change.target[0, 0] = target_after(routes, near, rng, i, 0)
     for s in range(1, length):
         u = rng.random()
         change.target[0, s] = near.near_target[
@@ -198,7 +104,7 @@ def _replace(routes: Routes, near: Neighbourhood, change: Change, rng: np.random
     """Another target in place of one; near the one before it, or near the one it replaces."""
     length = routes.length[i]
     s = draw(rng, length)
-    change.target[0, s] = _target_after(routes, near, rng, i, s if rng.random() < 0.5 else s + 1)
+    change.target[0, s] = target_after(routes, near, rng, i, s if rng.random() < 0.5 else s + 1)
     if change.target[0, s] == routes.target[i, s]:
         return False
     for q in range(s + 1, length):
@@ -256,7 +162,7 @@ def _eject(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.G
         return False
     # The new visit follows the one that is now number s, or number s - 1, of those that stay.
     begin = min(out, s)
-    put = _target_after(routes, near, rng, i, s if s < out else s + 1)
+    put = target_after(routes, near, rng, i, s if s < out else s + 1)
     to = begin
     for q in range(begin, length):
         if s < out and q == s:

@@ -1,9 +1,10 @@
 """The current plan of a search, with everything that makes a change cheap to evaluate.
 
-A UAV never waits: its s-th visit happens in step s. So a plan is a route a UAV, and visit number s of UAV i
-has its place ``slot = s * M + i`` in the order in which visits are taken; slots are sorted by it.
-What a visit unloads depends on two visits only: the one before it in its UAV's route (what is still carried)
-and the one before it at its target (what is still needed). The latter are kept as linked lists.
+A UAV never waits: its s-th stop, a visit or a reload, happens in step s. So a plan is a route a UAV, and stop
+number s of UAV i has its place ``slot = s * M + i`` in the order in which they are taken; slots are sorted by
+it. What a stop unloads or loads depends on two stops only: the one before it in its UAV's route (what is
+still carried) and the one before it at its target or base (what is still needed, or in stock). The latter are
+kept as linked lists; bases with as much as is asked for have none.
 """
 
 from __future__ import annotations
@@ -18,20 +19,24 @@ from app.simulation.visit import (
     START,
     air_length,
     aloft_after,
-    closing_cost,
     departure_after,
     exceeds_endurance,
     farthest,
     flown_with_return,
-    has_closing_cost,
+    is_base,
     is_committed_elsewhere,
     is_late,
+    is_unlimited,
     is_watched,
     lands_late,
     leg,
     leg_time,
     time_home,
     way_home,
+)
+from app.simulation.worth import (
+    closing_cost,
+    has_closing_cost,
 )
 
 SATISFACTION, DISTANCE, USELESS, CLOSING = 0, 1, 2, 3
@@ -44,18 +49,19 @@ class Routes(NamedTuple):
     Attributes
     ----------
     target, length
-        (M, S) targets in order and (M,) visits of each route.
+        (M, S) targets and bases in order, numbered as actions are, and (M,) stops of each route.
     flown, clock, aloft
-        (M, S+1) air length flown in the plan, the time, and the time in the air before each visit, and at
-        the end; the last one of UAVs for which it counts.
+        (M, S+1) air length flown in this flight, without ``dis`` of the first one, the time, and the time in
+        the air before each stop, and at the end; the last one of UAVs for which it counts. After a reload the
+        air length is ``-dis``, so that one range holds for all flights.
     load, need
-        (S*M, K) by slot: what the UAV carries and what the target needs just before the visit.
+        (S*M, K) by slot: what the UAV carries, and what the target needs or the base has, just before.
     earned
-        (S*M,) satisfaction of the visit.
+        (S*M,) satisfaction of the stop.
     useless
         (S*M,) visits that unload nothing; a plan with one is not legal.
     first, following, preceding
-        (N,), (S*M,), (S*M,): the visits of each target in order, as a doubly linked list of slots.
+        (L,), (S*M,), (S*M,): the stops at each target and base in order, as a doubly linked list of slots.
     landing, changes
         (M,) when a UAV has landed, 0 if it has no visit, and how many of its visits of ``start_plan`` are
         missing; where they cost reward.
@@ -82,7 +88,7 @@ class Routes(NamedTuple):
 
 def empty_routes(arrays: ProblemArrays) -> Routes:
     """Make the plan in which nobody flies, for the first problem of a stack."""
-    m, n, k = arrays.shape
+    m, _, k = arrays.shape
     steps = int(arrays.max_steps[0])
     slots = steps * m
     routes = Routes(
@@ -95,7 +101,7 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
         need=np.zeros((slots, k)),
         earned=np.zeros(slots),
         useless=np.zeros(slots, np.bool_),
-        first=np.full(n, NONE, np.int64),
+        first=np.full(arrays.between.shape[2], NONE, np.int64),
         following=np.full(slots, NONE, np.int64),
         preceding=np.full(slots, NONE, np.int64),
         landing=np.zeros(m),
@@ -108,8 +114,11 @@ def empty_routes(arrays: ProblemArrays) -> Routes:
 
 
 @compiled
-def link(routes: Routes, slot: int, target: int) -> None:
-    """Put a visit in its place in the list of its target."""
+def link(arrays: ProblemArrays, routes: Routes, slot: int, target: int) -> None:
+    """Put a stop in its place in the list of its target or base."""
+    if is_unlimited(arrays, target):
+        routes.preceding[slot], routes.following[slot] = NONE, NONE
+        return
     before, after = NONE, routes.first[target]
     while after != NONE and after < slot:
         before, after = after, routes.following[after]
@@ -123,8 +132,10 @@ def link(routes: Routes, slot: int, target: int) -> None:
 
 
 @compiled
-def unlink(routes: Routes, slot: int, target: int) -> int:
-    """Take a visit out of the list of its target and return the one that followed it there."""
+def unlink(arrays: ProblemArrays, routes: Routes, slot: int, target: int) -> int:
+    """Take a stop out of the list of its target or base and return the one that followed it there."""
+    if is_unlimited(arrays, target):
+        return NONE
     before, after = routes.preceding[slot], routes.following[slot]
     if before == NONE:
         routes.first[target] = after
@@ -146,7 +157,7 @@ def lay(
     clock: Floats,
     aloft: Floats,
 ) -> bool:
-    """Work out distances and times of a route from visit `begin` on; False where rule 2 forbids it.
+    """Work out distances and times of a route from stop `begin` on; False where rule 2 forbids it.
 
     Whether its visits unload anything is not looked at.
 
@@ -174,11 +185,28 @@ def lay(
         if flown_with_return(arrays, 0, i, j, flown[s + 1]) > most:
             return False
         arrival = clock[s] + time
+        if is_base(arrays, j):
+            if is_base(arrays, at) or is_committed_elsewhere(arrays, 0, i, s, j):
+                return False
+            clock[s + 1] = departure_after(arrays, 0, j, arrival)
+            if watched and (
+                exceeds_endurance(
+                    arrays,
+                    0,
+                    i,
+                    j,
+                    aloft_after(arrays, 0, i, at, aloft[s], clock[s], arrival, clock[s + 1], j),
+                )
+                or lands_late(arrays, 0, i, j, clock[s + 1])
+            ):
+                return False
+            flown[s + 1], aloft[s + 1] = -arrays.uavs[0, i].dis, 0.0
+            continue
         if is_late(arrival, arrays.areas[0, j].deadline) or is_committed_elsewhere(arrays, 0, i, s, j):
             return False
         clock[s + 1] = departure_after(arrays, 0, j, arrival)
         if watched:
-            aloft[s + 1] = aloft_after(arrays, 0, i, s == 0, aloft[s], clock[s], arrival, clock[s + 1], j)
+            aloft[s + 1] = aloft_after(arrays, 0, i, at, aloft[s], clock[s], arrival, clock[s + 1], j)
             if exceeds_endurance(arrays, 0, i, j, aloft[s + 1]) or lands_late(arrays, 0, i, j, clock[s + 1]):
                 return False
     return True
@@ -201,7 +229,7 @@ def sum_up(arrays: ProblemArrays, routes: Routes) -> None:
 @compiled
 def charged_distance(arrays: ProblemArrays, i: int, targets: Integers, length: int, flown: Floats) -> float:
     """Distance of a route as far as it costs reward."""
-    if not arrays.terms[0].in_wind:
+    if not arrays.terms[0].in_wind and arrays.stock.shape[1] == 0:
         distance = flown[length]
     else:
         distance = 0.0

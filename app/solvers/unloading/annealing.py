@@ -143,7 +143,7 @@ def anneal_planned(
             if gain > 0.0:
                 keep_if_best(planned)
         else:
-            undo(routes, change)
+            undo(search.arrays, routes, change)
             for q in range(concerned):
                 planned.unloading.value[planned.unloading.served[q]] = planned.before[q]
     tally[MOVES] += tried

@@ -64,7 +64,7 @@ class PlannedUnloading:
         The history's epochs are the algorithm's, with its rewards, which are those of greedy unloading, and
         one more for every round of the search.
         """
-        if problem.objective.unloading == "greedy" or nothing_to_fly(problem):
+        if not problem.plans_unloading or nothing_to_fly(problem):
             return self.algorithm.solve(problem, seed, stop, report)
         greedy = replace(problem, objective=replace(problem.objective, unloading="greedy"))
         incumbent = _Incumbent(problem)

@@ -22,9 +22,7 @@ from app.simulation.simulator import Episodes, compiled, earned_now, leg_home, l
 from app.simulation.visit import (
     ALLOWED,
     air_length,
-    cost_of,
     departure_after,
-    earned_by,
     flown_with_return,
     is_late,
     is_out_of_range,
@@ -32,6 +30,10 @@ from app.simulation.visit import (
     leg,
     leg_time,
     way_home,
+)
+from app.simulation.worth import (
+    cost_of,
+    earned_by,
 )
 
 FOLLOW_UPS = 16

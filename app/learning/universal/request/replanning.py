@@ -19,7 +19,13 @@ from app.learning.universal.network.agent import UniversalAgent
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, part
 from app.simulation.compilation import njit
 from app.simulation.simulator import Episodes, act, earned_now, new_episodes, reset_one, verdict
-from app.simulation.visit import ALLOWED, COMMITTED_ELSEWHERE, START, cost_of, leg
+from app.simulation.visit import (
+    ALLOWED,
+    COMMITTED_ELSEWHERE,
+    START,
+    leg,
+)
+from app.simulation.worth import cost_of
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
