@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Any
 
 from app.domain.errors import IllegalPlan, Violation
 from app.domain.plan import Plan
@@ -43,14 +44,20 @@ def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
     raise IllegalPlan(
         f"step {first.step}, {_figures(first)}{more}",
         violations,
-        details={"breaches": [asdict(breach) for breach in breaches]},
+        details={"breaches": [_recorded(breach) for breach in breaches]},
     )
+
+
+def _recorded(breach: Breach) -> dict[str, Any]:
+    """Return a breach as it is answered: with a base only where it is about one."""
+    return {name: each for name, each in asdict(breach).items() if name != "base_id" or each is not None}
 
 
 def _figures(breach: Breach) -> str:
     """Write a broken rule with its figures."""
     who = "the plan" if breach.uav_id is None else breach.uav_id
-    where = "" if breach.target_id is None else f" to {breach.target_id}"
+    stop = breach.base_id if breach.target_id is None else breach.target_id
+    where = "" if stop is None else f" to {stop}"
     says = f"{who}{where}: {breach.says}"
     if breach.needed is None or breach.had is None:
         return says

@@ -86,8 +86,9 @@ _PATH = "Points `[x, y]` flown over, first and last place included; null: a stra
 
 
 class StopModel(AnswerModel):
-    """One visit of a UAV; the last five only where the problem uses fields of the world, such as `wind`."""
+    """One visit of a UAV; the last ones only where the problem uses fields of the world, such as `wind`."""
 
+    kind: Literal["visit"] = Field(default="visit", description="Only where the problem has bases")
     target_id: str = Field(description="The rescue area")
     step: int = Field(description="Decision step, from 1")
     arrival_time: float = Field(description="Time units from now, or h")
@@ -107,6 +108,28 @@ class StopModel(AnswerModel):
     path: list[tuple[float, float]] | None = Field(default=None, description=f"{_PATH} to it")
 
 
+class ReloadModel(AnswerModel):
+    """One landing of a UAV at a base, where it takes up material and flies on."""
+
+    kind: Literal["reload"] = Field(description="What the stop is")
+    base_id: str = Field(description="The base")
+    step: int = Field(description="Decision step, from 1")
+    arrival_time: float = Field(description="Time units from now, or h")
+    distance: float = Field(description="Length of the leg flown to it")
+    loaded: list[float] = Field(description="Amounts taken up, one a material")
+    departure_time: float = Field(description="When it may take off again")
+    path: list[tuple[float, float]] | None = Field(description=f"{_PATH} to it")
+
+
+class BaseLeftModel(AnswerModel):
+    """A base at the end of the plan."""
+
+    base_id: str = Field(description="The base")
+    stock: list[float] | None = Field(
+        description="Amounts left, one a material; null: as much as is asked for"
+    )
+
+
 class LandingModel(AnswerModel):
     """The end of a route."""
 
@@ -114,6 +137,10 @@ class LandingModel(AnswerModel):
         description="When the UAV has landed; without `return_to_base`, when its last visit has ended"
     )
     path: list[tuple[float, float]] | None = Field(description=f"{_PATH} home")
+    base_id: str | None = Field(
+        default=None,
+        description="The base where it has landed; null: its starting point. Only with bases",
+    )
 
 
 class RouteModel(AnswerModel):
@@ -122,7 +149,9 @@ class RouteModel(AnswerModel):
     uav_id: str = Field(description="The UAV")
     distance: float = Field(description="Distance of the legs to its stops, without the leg home")
     return_distance: float = Field(description="Length of the leg home")
-    stops: list[StopModel] = Field(description="Its visits")
+    stops: list[StopModel | ReloadModel] = Field(
+        description="Its visits and, where the problem has bases, reloads"
+    )
     landing: LandingModel | None = Field(
         default=None,
         description="Its end; null for a UAV that does not fly. Only where the problem uses fields of the "
@@ -229,7 +258,8 @@ class Allocation(AnswerModel):
     )
     seed: int = Field(description="The seed that was used")
     assignment: list[list[int]] = Field(
-        description="One joint action a step: for each UAV the index of its target, or N for home"
+        description="One joint action a step: for each UAV the index of its target, N for home, or N + 1 + d "
+        "to reload at base d"
     )
     reward: float = Field(
         description="satisfaction - distance_weight · distance - makespan_weight · makespan - change_weight "
@@ -275,8 +305,11 @@ class Allocation(AnswerModel):
         description="Pairs of UAV and area that are visited in `start_plan` and not in the plan. Only where "
         "the problem uses fields of the world",
     )
+    bases: list[BaseLeftModel] | None = Field(
+        default=None, description="What is left of each stock. Only where the problem has bases"
+    )
     elapsed_s: float = Field(description="Seconds from the request's arrival to the plan")
 
 
-SOMETIMES_ANSWERED = frozenset({"makespan", "changes"})
-"""Fields of an allocation that are left out where the problem uses no field of the world."""
+SOMETIMES_ANSWERED = frozenset({"makespan", "changes", "bases"})
+"""Fields of an allocation that are left out where the problem uses no field of the world, or has no bases."""

@@ -9,6 +9,7 @@ from pydantic import Field
 from app.api.allocation_models import (
     MAX_TIME_LIMIT_S,
     AnswerModel,
+    BaseLeftModel,
     RouteModel,
     UnmetModel,
     WarningModel,
@@ -22,7 +23,8 @@ class EvaluationRequest(ProblemModel):
 
     assignment: list[list[Whole]] = Field(
         min_length=1,
-        description="One joint action a step: for each UAV the index of its target, or N for home",
+        description="One joint action a step: for each UAV the index of its target, N for home, or N + 1 + d "
+        "to reload at base d",
     )
     bound: bool = Field(
         default=False, description="Whether the answer has an upper bound on the reward of any plan"
@@ -55,6 +57,7 @@ class Evaluation(AnswerModel):
     warnings: list[WarningModel] = Field(default_factory=list, description="As of `POST /allocate`")
     makespan: float | None = Field(default=None, description="As of `POST /allocate`")
     changes: int | None = Field(default=None, description="As of `POST /allocate`")
+    bases: list[BaseLeftModel] | None = Field(default=None, description="As of `POST /allocate`")
     remaining: dict[str, Any] | None = Field(
         default=None,
         description="The problem as it stands at `at`, ready to be allocated: who is where with what, needs "

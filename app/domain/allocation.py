@@ -197,6 +197,8 @@ class UnmetCode(StrEnum):
     RANGE_USED = "range_used"
     TIME_USED = "time_used"
     LOADS_USED = "loads_used"
+    STOCK = "stock"
+    NO_TIME_FOR_RELOAD = "no_time_for_reload"
     NOT_WORTH_IT = "not_worth_it"
     NOT_CHOSEN = "not_chosen"
 
@@ -207,7 +209,7 @@ class UnmetCode(StrEnum):
 
 
 _MEANINGS = {
-    UnmetCode.NO_SUPPLY: "No UAV that can be sent carries any of what it still needs.",
+    UnmetCode.NO_SUPPLY: "No UAV that can be sent carries any of what it still needs, or can load any.",
     UnmetCode.SKILLS: "No UAV that carries any of it has all the skills that the area asks for.",
     UnmetCode.EXCLUDED: "Every UAV that carries any of it must not be sent there.",
     UnmetCode.NO_FLY_ZONE: "No way leads there, or home from there, round the no-fly zones.",
@@ -222,6 +224,8 @@ _MEANINGS = {
     UnmetCode.RANGE_USED: "A UAV has some of it left over, but its other visits leave it too little range.",
     UnmetCode.TIME_USED: "A UAV has some of it left over, but its other visits leave too little time.",
     UnmetCode.LOADS_USED: "The UAVs that could serve it unload elsewhere all that it could use.",
+    UnmetCode.STOCK: "What the UAVs carry of it is unloaded elsewhere, and the bases have none left.",
+    UnmetCode.NO_TIME_FOR_RELOAD: "A base has some of it left, but no UAV the time to fetch it and bring it.",
     UnmetCode.NOT_WORTH_IT: "One more visit would cost more distance than it earns.",
     UnmetCode.NOT_CHOSEN: "One more visit would earn something; if it is not verified, nobody has looked.",
 }

@@ -36,6 +36,7 @@ CODES = (
     "not_needed",
     "nothing_needed",
     "one_place",
+    "planned_with_bases",
     "range_implausible",
     "range_spent",
     "speed_implausible",
@@ -123,6 +124,9 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
     scene = _scene(problem)
     times = [warning for code, places in odd_times(problem) for warning in _some(code, places)]
     found = [*_supplies(scene), *times, *_speeds_and_ranges(scene), *_levels(scene)]
+    if problem.bases and problem.objective.unloading == "planned":
+        says = "with bases, visits unload all that is needed and carried, as greedy unloading does"
+        found.append(ProblemWarning("/objective/unloading", "planned_with_bases", says))
     if problem.matrices is not None:
         # Positions are for display alone.
         return tuple(found)

@@ -10,9 +10,14 @@ from app.domain.errors import NoCompatibleSource
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.learning.universal.episodes.effort import roll_out_work
-from app.simulation.arrays import Integers, ProblemArrays, compile_problem
+from app.simulation.arrays import (
+    Integers,
+    ProblemArrays,
+    compile_problem,
+)
 from app.simulation.evaluation import rewards_of
 from app.simulation.simulator import new_episodes
+from app.simulation.stacks import without_reloads
 from app.simulation.visit import ALLOWED
 from app.solvers.local_search.annealing import Search, actions_of, new_search, set_routes
 from app.solvers.local_search.solver import how_long, search_on, watching
@@ -69,10 +74,12 @@ class Auto:
         moves, restarts = how_long(search, given.moves, given.restarts, stop)
         policy = policy_pays(arrays, stop.seconds_left()) if given.policy is None else given.policy
         source = None
-        if policy and self._context.library_url and not new_episodes(arrays, 1).done[0] and not stop():
+        # The policy knows no reloads.
+        played = without_reloads(arrays)
+        if policy and self._context.library_url and not new_episodes(played, 1).done[0] and not stop():
             reward = float(search.best[0])
             report(Progress(0.0, 0, reward, Plan.of(actions_of(search), problem.n_targets)))
-            found = self._policy_starts(problem, arrays, seed, share_of_time(stop, _POLICY_SHARE))
+            found = self._policy_starts(problem, played, seed, share_of_time(stop, _POLICY_SHARE))
             if found is not None:
                 plans, source = found
                 _start_from_best(search, plans)

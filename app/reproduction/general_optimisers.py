@@ -38,10 +38,18 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
-from app.simulation.arrays import Floats, ProblemArrays, alike, compile_problem
+from app.simulation.arrays import (
+    Floats,
+    ProblemArrays,
+    compile_problem,
+)
 from app.simulation.evaluation import reward_of
 from app.simulation.legs import UNREACHABLE
 from app.simulation.simulator import act, end_step, new_episodes, verdict
+from app.simulation.stacks import (
+    alike,
+    without_reloads,
+)
 from app.simulation.visit import ALLOWED
 
 _RESOLUTION = 1e5
@@ -175,7 +183,7 @@ def _better_plan(
     problem: Problem, seconds: float, solve: Callable[[ProblemArrays, _Model, float], list[list[int]]]
 ) -> Plan:
     """Solve both models in half of the time each, if they differ; return the better plan, by its reward."""
-    arrays = compile_problem(problem)
+    arrays = without_reloads(compile_problem(problem))
     empty = Plan.empty(problem.n_uavs, problem.n_targets)
     models = [_model(problem, arrays, by_material=by_material) for by_material in (False, True)]
     if not models[0].clients or all(uav.ret for uav in problem.uavs):

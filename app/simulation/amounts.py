@@ -6,7 +6,7 @@ import numpy as np
 
 from app.domain.problem import ROUNDING
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.simulation.visit import most_carried
 
 _DIGITS = 9

@@ -10,6 +10,8 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation import simulator, visit
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 
 NAMES = {
     visit.RETURNING: "returning",
@@ -110,10 +112,8 @@ def _breach(
     return Breach(s + 1, uav_id, target_id, NAMES[rule], says, needed, had, base_id)
 
 
-@simulator.compiled
-def _measure(
-    arrays: ProblemArrays, episodes: simulator.Episodes, i: int, j: int, rule: int, figures: Floats
-) -> None:
+@compiled
+def _measure(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, rule: int, figures: Floats) -> None:
     """Write down what a visit needs that a rule forbids, and what there is."""
     length = visit.leg(arrays, 0, i, episodes.at[0, i], j)
     time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, length)

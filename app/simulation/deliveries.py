@@ -16,7 +16,7 @@ import numpy as np
 
 from app.domain.problem import ROUNDING
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.simulation.worth import worths
 
 

@@ -29,6 +29,8 @@ from app.domain.world_use import uses_world
 from app.simulation import simulator, visit
 from app.simulation.amounts import tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem, homes_of
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.evaluation import replayed
 from app.simulation.homes import AT_START
 from app.simulation.replay import Replay, deliver
@@ -96,9 +98,7 @@ def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
     return tuple(_timed_routes(problem, actions, trace, episodes))
 
 
-def _traced(
-    problem: Problem, arrays: ProblemArrays, actions: Actions
-) -> tuple[Replay, Trace, simulator.Episodes]:
+def _traced(problem: Problem, arrays: ProblemArrays, actions: Actions) -> tuple[Replay, Trace, Episodes]:
     """Replay a plan, and trace it.
 
     No UAV is sent home in the trace: at its end every one is still at its last stop, which is where the leg
@@ -137,7 +137,7 @@ def _steps(problem: Problem, actions: Actions, i: int) -> list[int]:
 
 
 def _timed_routes(
-    problem: Problem, actions: Actions, trace: Trace, episodes: simulator.Episodes
+    problem: Problem, actions: Actions, trace: Trace, episodes: Episodes
 ) -> Iterator[LandingRoute]:
     ways, homes = Ways(problem), homes_of(problem)
     for i, uav in enumerate(problem.uavs):
@@ -248,10 +248,8 @@ def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> 
     )
 
 
-@simulator.compiled
-def _trace(
-    arrays: ProblemArrays, episodes: simulator.Episodes, actions: Actions, planned: bool, trace: Trace
-) -> None:
+@compiled
+def _trace(arrays: ProblemArrays, episodes: Episodes, actions: Actions, planned: bool, trace: Trace) -> None:
     """Fly the stops of a legal plan, and write down what each does, then the legs home.
 
     Deliveries are written down too, unless they are planned: then the trace has them.

@@ -8,7 +8,9 @@ import numpy as np
 
 from app.simulation import simulator
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled
 from app.simulation.deliveries import Visits, visits_of
+from app.simulation.episodes import Episodes
 from app.simulation.replay import deliver
 from app.simulation.visit import is_base
 
@@ -87,9 +89,9 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
     return plan
 
 
-@simulator.compiled
+@compiled
 def _fly(
-    arrays: ProblemArrays, episodes: simulator.Episodes, plan: FlownPlan, delivered: Floats, planned: bool
+    arrays: ProblemArrays, episodes: Episodes, plan: FlownPlan, delivered: Floats, planned: bool
 ) -> None:
     m, materials = plan.load.shape[0], plan.load.shape[2]
     visits = plan.visits

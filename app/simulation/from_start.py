@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation import simulator, visit
+from app.simulation import visit
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled, inlined
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.visit import inlined
 
 _NOWHERE = -2
 """In place of where a flight begins: there is no such place."""
@@ -72,7 +72,7 @@ def needs_of(arrays: ProblemArrays, i: int, j: int) -> DirectNeeds:
     return DirectNeeds(*found.tolist())
 
 
-@simulator.compiled
+@compiled
 def _measure(arrays: ProblemArrays, i: int, j: int, found: Floats) -> None:
     clock = visit.ready(arrays, 0, i)
     length = visit.leg(arrays, 0, i, visit.START, j)
@@ -94,13 +94,13 @@ def carries(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
     return bool(useful and not arrays.ret[0, i])
 
 
-@simulator.compiled
+@compiled
 def is_carried(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int) -> bool:
     """As :func:`carries`, to be called from Python."""
     return carries(arrays, plan, i, j)
 
 
-@simulator.compiled
+@compiled
 def _rule_from(arrays: ProblemArrays, i: int, at: int, j: int) -> int:
     """Rule that a flight to a target breaks that begins at the start, or at a base flown to directly."""
     flown, clock, aloft = arrays.uavs[0, i].dis, visit.ready(arrays, 0, i), visit.airborne(arrays, 0, i)
@@ -145,7 +145,7 @@ def _progress(rule: int) -> int:
     return far
 
 
-@simulator.compiled
+@compiled
 def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
     """Rule that a UAV's direct flight to a target breaks, whatever it unloads and is committed to.
 
@@ -161,7 +161,7 @@ def direct_rule(arrays: ProblemArrays, i: int, j: int) -> int:
     return rule
 
 
-@simulator.compiled
+@compiled
 def _look_from_start(arrays: ProblemArrays, plan: FlownPlan, targets: Integers, start: Start) -> None:
     """Which UAV carries what a target needs, which of these has the range, and which of those is first."""
     for i in range(arrays.load.shape[1]):

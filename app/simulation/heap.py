@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.simulation.arrays import Integers
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 
 
 @compiled

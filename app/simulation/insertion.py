@@ -15,9 +15,10 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled, inlined
+from app.simulation.episodes import Episodes
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.heap import pop, push
-from app.simulation.visit import inlined
 
 MARK, QUEUED, CHANGED, WORK, MADE, HELPS = range(6)
 """Places in ``Trial.tally``."""
@@ -54,7 +55,7 @@ class Trial(NamedTuple):
         (2,) change of the reward, and the sum of the absolute values that it is made of.
     """
 
-    episodes: simulator.Episodes
+    episodes: Episodes
     uav_mark: Integers
     target_mark: Integers
     cursor: Integers
@@ -84,7 +85,7 @@ def new_trial(arrays: ProblemArrays, plan: FlownPlan) -> Trial:
     )
 
 
-@simulator.compiled
+@compiled
 def gain_of_visit(
     arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int, reloaded: bool
 ) -> float:
@@ -118,7 +119,7 @@ def gain_of_visit(
     if reloaded:
         for k in range(plan.load.shape[2]):
             episodes.load[0, i, k] = arrays.load[0, i, k]
-    _change(trial, i, first)
+    change_uav(trial, i, first)
     _push(trial.queue, trial.queue_mark, tally, first * m + i)
     while tally[QUEUED] > 0:
         slot = _pop(trial.queue, tally)
@@ -136,7 +137,7 @@ def gain_of_visit(
                 if same:
                     continue
                 settled = True
-            _change(trial, h, s + 1 if settled else s)
+            change_uav(trial, h, s + 1 if settled else s)
         length = visits.length[h] + (1 if h == i and place >= 0 else 0)
         if not settled:
             if s < visits.length[h]:
@@ -171,7 +172,9 @@ def gain_of_visit(
             back = simulator.leg_home(arrays, episodes, 0, h)
             exchange(total, -worth.cost_of(arrays, 0, plan.back[h]), -worth.cost_of(arrays, 0, back))
     if worth.has_closing_cost(arrays, 0):
-        exchange(total, -_closing_cost(arrays, plan, trial, False), -_closing_cost(arrays, plan, trial, True))
+        exchange(
+            total, -closing_cost_of(arrays, plan, trial, False), -closing_cost_of(arrays, plan, trial, True)
+        )
     if trial.target_mark[j] == mark:
         lacked, lacks = 0.0, 0.0
         for k in range(plan.load.shape[2]):
@@ -181,7 +184,7 @@ def gain_of_visit(
     return gain(total)
 
 
-@simulator.compiled
+@compiled
 def gain_of_undisturbed_visit(
     arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int, place: int, j: int
 ) -> float:
@@ -221,8 +224,8 @@ def is_undisturbed(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, i: int,
     return undisturbed
 
 
-@simulator.compiled
-def _closing_cost(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, changed: bool) -> float:
+@compiled
+def closing_cost_of(arrays: ProblemArrays, plan: FlownPlan, trial: Trial, changed: bool) -> float:
     """What makespan and changes cost in the plan, or with what the trial has changed in it."""
     episodes, makespan, changes = trial.episodes, 0.0, 0.0
     for h in range(plan.back.shape[0]):
@@ -263,14 +266,14 @@ def begin(trial: Trial, i: int, place: int, j: int) -> None:
     trial.total[GAIN], trial.total[TURNOVER] = 0.0, 0.0
 
 
-@simulator.compiled
+@compiled
 def charge(total: Floats, change: float) -> None:
     """Add a change of the reward."""
     total[GAIN] += change
     total[TURNOVER] += abs(change)
 
 
-@simulator.compiled
+@compiled
 def exchange(total: Floats, before: float, after: float) -> None:
     """Put one value in the place of another."""
     if after != before:
@@ -278,7 +281,7 @@ def exchange(total: Floats, before: float, after: float) -> None:
         total[TURNOVER] += abs(after - before) + _ROUNDING_OF_VALUES * (abs(before) + abs(after))
 
 
-@simulator.compiled
+@compiled
 def gain(total: Floats) -> float:
     """Change of the reward in all; 0 where it is only the rounding of what is turned over."""
     change: float = total[GAIN]
@@ -345,7 +348,7 @@ def _place_in_plan(trial: Trial, h: int, cursor: int) -> int:
 
 
 @inlined
-def _change(trial: Trial, h: int, cursor: int) -> None:
+def change_uav(trial: Trial, h: int, cursor: int) -> None:
     """Let a UAV go its own way from now on."""
     trial.uav_mark[h] = trial.tally[MARK]
     trial.cursor[h] = cursor
@@ -367,7 +370,7 @@ def _open(
             later = following[later]
 
 
-@simulator.compiled
+@compiled
 def _push(queue: Integers, queue_mark: Integers, tally: Integers, slot: int) -> None:
     """Queue a slot, once."""
     if queue_mark[slot] != tally[MARK]:
@@ -376,7 +379,7 @@ def _push(queue: Integers, queue_mark: Integers, tally: Integers, slot: int) -> 
         tally[QUEUED] += 1
 
 
-@simulator.compiled
+@compiled
 def _pop(queue: Integers, tally: Integers) -> int:
     """Take the earliest slot out of the queue."""
     slot = pop(queue, tally[QUEUED])

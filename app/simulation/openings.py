@@ -13,6 +13,7 @@ import numpy as np
 
 from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled, inlined
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.from_start import Start, carries, direct_rule
 from app.simulation.insertion import (
@@ -29,7 +30,6 @@ from app.simulation.insertion import (
 )
 from app.simulation.planned_insertion import ADDS, ALL_KEPT, ONLY_LOOK, PlannedTrial, gain_of_planned_visit
 from app.simulation.shortfalls import RANGE, STEP, TIME, detour, lacking
-from app.simulation.visit import inlined
 
 _WORK = 2_000_000
 """Visits flown for all areas of an answer: some tenths of a second. Beyond, no more are looked at."""
@@ -100,7 +100,7 @@ class Lookout:
         self._arrays = arrays._replace(
             uavs=arrays.uavs.copy(), areas=arrays.areas.copy(), max_steps=arrays.max_steps.copy()
         )
-        self._plan, self._trial, self._planned, self._hurry = plan, trial, planned, hurry
+        self._plan, self.trial, self._planned, self._hurry = plan, trial, planned, hurry
         # A visit with many materials takes longer.
         self._size = 1 + arrays.shape[2] / 16
         room = plan.leg.shape[1] + 3
@@ -109,7 +109,7 @@ class Lookout:
     @property
     def spent(self) -> bool:
         """Whether this answer has had its share of looking, however much time there is."""
-        return int(self._trial.tally[WORK]) >= _WORK / self._size
+        return int(self.trial.tally[WORK]) >= _WORK / self._size
 
     def look(self, j: int, start: Start) -> Places | None:
         """Look at all places for a visit to target `j`; None if that cannot be finished."""
@@ -128,7 +128,7 @@ class Lookout:
         i = 0
         while True:
             i = _look(
-                self._arrays, self._plan, self._trial, self._planned, j, comers, i,
+                self._arrays, self._plan, self.trial, self._planned, j, comers, i,
                 self._lacking, self._kept, found,
             )  # fmt: skip
             if i >= self._arrays.shape[0]:
@@ -169,7 +169,7 @@ def _comes(arrays: ProblemArrays, plan: FlownPlan, i: int, j: int, comers: int) 
     return comes
 
 
-@simulator.compiled
+@compiled
 def _look(
     arrays: ProblemArrays,
     plan: FlownPlan,

@@ -14,6 +14,7 @@ import numpy as np
 from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled, inlined
 from app.simulation.deliveries import Unloading, Visits, new_unloading, serve, visits_of
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
@@ -29,7 +30,6 @@ from app.simulation.insertion import (
     exchange,
     gain,
 )
-from app.simulation.visit import inlined
 from app.simulation.visit_lists import connected, move_slot
 
 ONLY_LOOK = -2
@@ -94,7 +94,7 @@ def new_planned_trial(arrays: ProblemArrays, plan: FlownPlan, actions: Integers)
     )
 
 
-@simulator.compiled
+@compiled
 def gain_of_planned_visit(
     arrays: ProblemArrays,
     plan: FlownPlan,
@@ -260,7 +260,7 @@ def _amounts_anew(
             move_slot(visits, s * m + i, j, visits.target[i, s])
 
 
-@simulator.compiled
+@compiled
 def _unloads_nothing(load: Floats, need: Floats, target: Integers, amount: Floats, i: int, s: int) -> bool:
     """Whether what a visit unloads is nothing, or only rounding."""
     for k in range(amount.shape[1]):
@@ -269,7 +269,7 @@ def _unloads_nothing(load: Floats, need: Floats, target: Integers, amount: Float
     return True
 
 
-@simulator.compiled
+@compiled
 def _can_unload(load: Floats, need: Floats, visits: Visits, amount: Floats, i: int, j: int) -> bool:
     """Whether every visit of UAV `i` to target `j` can unload something.
 
@@ -290,7 +290,7 @@ def _can_unload(load: Floats, need: Floats, visits: Visits, amount: Floats, i: i
     return False
 
 
-@simulator.compiled
+@compiled
 def _charge_way(
     arrays: ProblemArrays,
     visits: Visits,

@@ -9,12 +9,12 @@ import numpy as np
 from app.domain.problem import TOLERANCE
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.simulator import (
-    Episodes,
     act,
     changes_of,
     close,
-    compiled,
     fly_to,
     makespan_of,
     reach_verdict,

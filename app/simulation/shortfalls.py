@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation import simulator, visit
+from app.simulation import visit
 from app.simulation.arrays import Floats, ProblemArrays
+from app.simulation.decorators import compiled, inlined
 from app.simulation.flown_plan import FlownPlan
-from app.simulation.visit import inlined
 
 STEP, RANGE, TIME = 1, 2, 4
 """What a visit lacks, as a sum, where the UAV keeps all the others of its route."""
@@ -31,7 +31,7 @@ def detour(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int) -
     return extra
 
 
-@simulator.compiled
+@compiled
 def lacking(arrays: ProblemArrays, plan: FlownPlan, i: int, place: int, j: int, lacks: Floats) -> int:
     """What a UAV lacks for one more visit, if it keeps all others.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.domain.allocation import Relaxation, Unmet, UnmetCode
 from app.domain.problem import Problem
+from app.simulation.another_flight import NO_STEPS, another_flight
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
 from app.simulation.flown_plan import FlownPlan, record_plan
@@ -26,7 +27,14 @@ from app.simulation.openings import AS_IS, Lookout, Places
 from app.simulation.planned_insertion import new_planned_trial
 from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.unmet_wording import Wording
-from app.simulation.visit import COMMITTED_ELSEWHERE, HOME_TOO_LATE, TOO_LONG_ALOFT, farthest, is_late
+from app.simulation.visit import (
+    COMMITTED_ELSEWHERE,
+    HOME_TOO_LATE,
+    TOO_LATE,
+    TOO_LONG_ALOFT,
+    farthest,
+    is_late,
+)
 
 _RELAXED = (STEP, RANGE, TIME, STEP + RANGE, STEP + TIME, RANGE + TIME, STEP + RANGE + TIME)
 """What a visit may lack, fewest things first."""
@@ -221,6 +229,8 @@ class _Evaluator:
                 return self._unmet(j, code, says, remedy, outcome)
         code, says = UnmetCode.LOADS_USED, self._says.loads_used(None if now is None else now.gain)
         uav = None
+        if self._problem.bases and not places.left_over[0]:
+            code, says, uav = self._of_another_flight(j, code, says)
         possible = (places.uav[:AS_IS] != NONE).any()
         if places.left_over[0] and not possible and places.blocked[0] != NONE:
             uav, place, rule = places.blocked.tolist()
@@ -238,6 +248,21 @@ class _Evaluator:
             if outcome.helps and outcome.gain > 0:
                 return self._unmet(j, code, says, remedy, outcome)
         return self._unmet(j, code, says, best, now, uav=uav, stated=False)
+
+    def _of_another_flight(self, j: int, code: UnmetCode, says: str) -> tuple[UnmetCode, str, int | None]:
+        """Why no UAV fetches what is missing: with bases, what is aboard is not all that there is."""
+        flight = another_flight(self._arrays, self._plan, self._lookout.trial, j)
+        if not flight.in_stock:
+            return UnmetCode.STOCK, self._says.stock(), None
+        if flight.uav != NONE:
+            worth_it = flight.gain > 0.0
+            code = UnmetCode.NOT_CHOSEN if worth_it else UnmetCode.NOT_WORTH_IT
+            return code, self._says.another_flight(flight.uav, flight.base, flight.gain), flight.uav
+        if flight.rules <= {TOO_LATE, HOME_TOO_LATE}:
+            return UnmetCode.NO_TIME_FOR_RELOAD, self._says.no_time_for_reload(), None
+        if NO_STEPS in flight.rules:
+            return UnmetCode.STEP_LIMIT, self._says.no_steps_for_reload(), None
+        return code, says, None
 
     def _relaxed(self, j: int, places: Places) -> Iterator[_Remedy]:
         """Visits with what is left over that gain once range, time or steps are there."""
@@ -266,7 +291,8 @@ class _Evaluator:
         """What UAV `i` has to carry more for all that is missing, and for what areas before it would take."""
         missing = self._plan.remaining[j]
         wanted = missing.copy()
-        for x in {int(x) for x in self._plan.visits.target[i, :place]} - {j}:
+        route = self._plan.visits.target[i, :place]
+        for x in set(route[route < self._problem.n_targets].tolist()) - {j}:
             wanted += np.where(missing > 0, self._plan.remaining[x], 0.0)
         more: Floats = np.maximum(wanted - self._plan.spare[i], 0.0)
         return more

@@ -155,6 +155,27 @@ class Wording:
             f"cost {-gain:.6g}" if gain < 0 else "earn no more"
         )
 
+    def stock(self) -> str:
+        """All that is carried is unloaded elsewhere, and no base has any left."""
+        return "the UAVs unload elsewhere all that they carry of it, and no base has any left for them"
+
+    def another_flight(self, i: int, d: int, gain: float) -> str:
+        """A reload and a visit after all others of UAV `i` are allowed; what they bring."""
+        flight = f"another flight of {self._uav(i)}, from {self._problem.bases[d].id} at the end,"
+        if gain > 0.0:
+            return f"{flight} would earn {gain:.6g}; a better algorithm or more time finds it"
+        if gain < 0.0:
+            return f"{flight} would cost {-gain:.6g} more than it earns"
+        return f"{flight} would earn no more than it costs"
+
+    def no_time_for_reload(self) -> str:
+        """A base has it, but nobody is there and back in time."""
+        return "no UAV has the time to fetch it at a base after its other stops, and bring it"
+
+    def no_steps_for_reload(self) -> str:
+        """A base has it, but nobody has two steps left."""
+        return "no UAV has the two steps left that it takes to fetch it at a base, and bring it"
+
     def even_then(self, gain: float) -> str:
         """What a visit costs in spite of its remedy."""
         if gain < 0:
@@ -190,4 +211,5 @@ class Wording:
     def _where(self, i: int, place: int) -> str:
         if place == 0:
             return "first"
-        return f"after {self._problem.targets[int(self._plan.visits.target[i, place - 1])].id}"
+        stop, n = int(self._plan.visits.target[i, place - 1]), self._problem.n_targets
+        return f"after {self._problem.targets[stop].id if stop < n else self._problem.bases[stop - n - 1].id}"

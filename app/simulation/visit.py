@@ -11,25 +11,12 @@ UAV is: ``START``, such a stop, or N where it has landed for good.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
-
 import numpy as np
 
 from app.domain.problem import ROUNDING, TOLERANCE
 from app.simulation.arrays import NONE, Flags, Floats, ProblemArrays
-from app.simulation.compilation import njit
+from app.simulation.decorators import inlined
 from app.simulation.legs import UNREACHABLE
-
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-_INLINED: dict[str, Any] = {"inline": "always", "cache": True, "error_model": "numpy", "_nrt": False}
-inlined: Callable[[Function], Function] = njit(**_INLINED)
-"""For small functions, and those with one caller: they are compiled as a part of their callers.
-
-Whatever is compiled by itself takes long where all the arrays of a plan are its arguments, and once more in
-each of its callers. Functions that are not inlined take only the arrays that they need.
-"""
 
 START = -1
 """Value of ``at`` for a UAV that is still where the request has it."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from app.simulation import simulator
 from app.simulation.arrays import NONE, Integers
+from app.simulation.decorators import compiled
 from app.simulation.deliveries import Unloading, Visits
 from app.simulation.insertion import CHANGED, MARK
 
 
-@simulator.compiled
+@compiled
 def move_slot(visits: Visits, slot: int, old: int, new: int) -> None:
     """Take a slot out of one target's list and put it in its order into another's; NONE is no target."""
     if old != NONE:
@@ -31,7 +31,7 @@ def move_slot(visits: Visits, slot: int, old: int, new: int) -> None:
             visits.following[at] = slot
 
 
-@simulator.compiled
+@compiled
 def connected(
     visits: Visits,
     routes: Integers,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.simulation.arrays import Floats, ProblemArrays
-from app.simulation.visit import inlined
+from app.simulation.decorators import inlined
 
 
 @inlined

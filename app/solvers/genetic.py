@@ -18,11 +18,11 @@ from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.compilation import njit
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.simulator import (
-    Episodes,
     act,
     close,
-    compiled,
     new_episodes,
     promised,
     reset_one,

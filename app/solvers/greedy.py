@@ -12,11 +12,11 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.evaluation import reward_of
 from app.simulation.simulator import (
-    Episodes,
     act,
-    compiled,
     earned_now,
     end_step,
     leg_home,

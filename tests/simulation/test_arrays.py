@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from app.domain.surroundings import Wind
-from app.simulation.arrays import AXES, OF_UAVS, alike, compile_problem, part, stack
+from app.simulation.arrays import (
+    AXES,
+    OF_UAVS,
+    compile_problem,
+)
 from app.simulation.generator import generate
+from app.simulation.stacks import (
+    alike,
+    part,
+    stack,
+)
 
 SIZES = {"M": 4, "N": 6, "K": 2}
 

@@ -14,9 +14,10 @@ from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation import simulator, visit
-from app.simulation.arrays import compile_problem, stack
+from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import reward_of, rewards_of
 from app.simulation.explain import explain
+from app.simulation.stacks import stack
 
 RULES = {
     "returning": visit.RETURNING,

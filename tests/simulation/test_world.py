@@ -8,16 +8,23 @@ import pytest
 from problems import random_plan
 from referee import Illegal, replay
 from referee_legs import Legs, apart, home_of, place_of, start_of
-from worlds import random_world
+from worlds import random_sorties, random_world
 
-from app.domain.allocation import Allocation, LandingRoute, TimedAllocation, TimedStop
+from app.domain.allocation import (
+    Allocation,
+    LandingRoute,
+    Reload,
+    SortieAllocation,
+    TimedAllocation,
+    TimedStop,
+)
 from app.domain.errors import IllegalPlan
 from app.domain.fields import Part, declared_fields
 from app.domain.matrices import Matrix
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record, to_record
-from app.domain.surroundings import Material, NoFlyZone, Wind
+from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 from app.domain.world_use import uses_world
 from app.simulation import visit
 from app.simulation.arrays import compile_problem
@@ -33,6 +40,7 @@ RULES = {
     "committed": visit.COMMITTED_ELSEWHERE,
     "endurance": visit.TOO_LONG_ALOFT,
     "landing": visit.HOME_TOO_LATE,
+    "reloaded": visit.RELOADED,
 }
 TIMES = ("arrival_time", "begin_time", "departure_time", "distance", "range_left", "endurance_left")
 
@@ -44,7 +52,8 @@ def plans(problem, rng, count):
             yield random_plan(problem, rng)
         else:
             steps = int(rng.integers(1, problem.max_steps + 1))
-            rows = rng.integers(0, problem.n_targets + 1, (steps, problem.n_uavs)).tolist()
+            actions = problem.n_targets + 1 + problem.n_bases
+            rows = rng.integers(0, actions, (steps, problem.n_uavs)).tolist()
             yield Plan(tuple(map(tuple, rows)))
 
 
@@ -55,12 +64,13 @@ def close(value, expected, scale=1.0):
     return value == pytest.approx(expected, rel=1e-9, abs=1e-9 * max(1.0, scale))
 
 
-def test_the_simulator_agrees_with_the_referee():
+@pytest.mark.parametrize("draw", [random_world, random_sorties])
+def test_the_simulator_agrees_with_the_referee(draw):
     rng = np.random.default_rng(8)
-    broken = dict.fromkeys(RULES, 0)
+    broken = {rule: 0 for rule in RULES if draw is random_sorties or rule != "reloaded"}
     legal = 0
     for _ in range(120):
-        problem = random_world(rng)
+        problem = draw(rng)
         arrays, record = compile_problem(problem), problem_to_record(problem)
         legs = Legs(record)
         for plan in plans(problem, rng, 16):
@@ -80,11 +90,12 @@ def test_the_simulator_agrees_with_the_referee():
     assert min(broken.values()) > 2, broken
 
 
-def test_every_figure_of_an_answer_agrees_with_the_referee():
+@pytest.mark.parametrize("draw", [random_world, random_sorties])
+def test_every_figure_of_an_answer_agrees_with_the_referee(draw):
     rng = np.random.default_rng(11)
-    waited = answered = 0
+    waited = answered = reloads = 0
     for _ in range(80):
-        problem = random_world(rng)
+        problem = draw(rng)
         if problem.objective.half_life is None and rng.random() < 0.3:
             problem = replace(problem, objective=replace(problem.objective, unloading="planned"))
         record, plan = problem_to_record(problem), random_plan(problem, rng)
@@ -94,7 +105,7 @@ def test_every_figure_of_an_answer_agrees_with_the_referee():
             assert problem.objective.unloading == "planned"
             continue
         answered += 1
-        assert isinstance(answer, TimedAllocation)
+        assert isinstance(answer, SortieAllocation if problem.bases else TimedAllocation)
         expected = replay(record, answer.plan.assignment, amounts(problem, answer), Legs(record))
         for name in ("reward", "satisfaction", "distance", "makespan"):
             assert close(getattr(answer, name), expected[name])
@@ -102,21 +113,29 @@ def test_every_figure_of_an_answer_agrees_with_the_referee():
         for i, route in enumerate(answer.routes):
             assert isinstance(route, LandingRoute)
             stops = expected["stops"][i]
-            assert [problem.targets[stop["target"]].id for stop in stops] == [
-                stop.target_id for stop in route.stops
-            ]
             for stop, judged in zip(route.stops, stops, strict=True):
-                assert isinstance(stop, TimedStop)
-                assert all(close(getattr(stop, name), judged[name], problem.extent) for name in TIMES)
-                waited += stop.begin_time > stop.arrival_time
+                if isinstance(stop, Reload):
+                    reloads += 1
+                    assert stop.base_id == problem.bases[judged["base"]].id
+                    assert stop.loaded == pytest.approx(judged["loaded"])
+                    names = ("arrival_time", "departure_time", "distance")
+                else:
+                    assert isinstance(stop, TimedStop)
+                    assert stop.target_id == problem.targets[judged["target"]].id
+                    names = TIMES
+                    waited += stop.begin_time > stop.arrival_time
+                assert all(close(getattr(stop, name), judged[name], problem.extent) for name in names)
             flies = bool(stops) or (route.return_distance > 0 and problem.objective.return_to_base)
             assert (route.landing is not None) == flies
             if route.landing is not None:
                 assert close(route.landing.time, expected["landed"][i])
         seen = max((route.landing.time for route in answer.routes if route.stops), default=0.0)
         assert close(answer.makespan, seen)
+        for base, left in zip(getattr(answer, "bases", ()), expected["stocks"], strict=True):
+            assert base.stock is None or base.stock == pytest.approx(left)
     assert waited > 15
     assert answered > 70
+    assert reloads > (50 if draw is random_sorties else -1)
 
 
 def worthwhile(problem, plan):
@@ -141,27 +160,33 @@ def amounts(problem, answer):
     nothing = [0.0] * problem.n_materials
     given = [[list(nothing) for _ in problem.uavs] for _ in answer.plan.assignment]
     for i, route in enumerate(answer.routes):
-        for stop in route.stops:
+        for stop in route.visits:
             given[stop.step - 1][i] = list(stop.delivered)
     return given
 
 
 def test_a_path_is_the_shortest_way_and_says_where_it_turns():
     rng = np.random.default_rng(4)
-    turned = 0
-    for _ in range(120):
-        problem = random_world(rng)
+    turned = at_bases = 0
+    for number in range(160):
+        problem = random_world(rng) if number < 120 else random_sorties(rng)
         record = problem_to_record(problem)
         answer, legs = explain(problem, random_plan(problem, rng)), Legs(record)
         areas = {area["id"]: place_of(area) for area in record["targets"]}
+        bases = {base["id"]: place_of(base) for base in record.get("bases", ())}
         for uav, route in zip(record["uavs"], answer.routes, strict=True):
             here = start_of(uav)
             for stop in route.stops:
-                turned += check_path(legs, here, areas[stop.target_id], stop.path, stop.distance)
-                here = areas[stop.target_id]
+                there = bases[stop.base_id] if isinstance(stop, Reload) else areas[stop.target_id]
+                turned += check_path(legs, here, there, stop.path, stop.distance)
+                here = there
             if route.landing is not None and problem.objective.return_to_base:
-                check_path(legs, here, home_of(uav), route.landing.path, route.return_distance)
+                base = getattr(route.landing, "base_id", None)
+                there = home_of(uav) if base is None else bases[base]
+                at_bases += base is not None
+                check_path(legs, here, there, route.landing.path, route.return_distance)
     assert turned > 8
+    assert at_bases > 10
 
 
 def check_path(legs, here, there, path, length):
@@ -193,6 +218,8 @@ USED = {
     **{(UAV, name): 1.5 for name in ("endurance", "airborne", "available_from", "available_until")},
     (UAV, "reserve"): 0.1,
     (UAV, "capacity"): 9.0,
+    (UAV, "full_load"): (9.0,),
+    (UAV, "bases"): (),
     (UAV, "skills"): ("medic",),
     (UAV, "excluded"): ("a",),
     (UAV, "committed"): ("a",),
@@ -208,6 +235,7 @@ USED = {
     (Objective, "minimum_share"): 0.5,
     (Problem, "no_fly_zones"): (NoFlyZone("z", ((0, 1), (1, 1), (1, 2))),),
     (Problem, "wind"): Wind(0.5, 90.0),
+    (Problem, "bases"): (Base("b", 1, 1),),
     (Problem, "matrices"): {"road": Matrix([[0.0, 1.0], [1.0, 0.0]])},
     (Problem, "start_plan"): ((0,),),
 }
@@ -243,7 +271,7 @@ def test_every_field_of_the_world_is_a_use_of_it():
     parts = [Problem, *(each.kind.of for each in declared_fields(Problem) if isinstance(each.kind, Part))]
     later = {(of, each.name) for of in parts for each in declared_fields(of) if not each.always_recorded}
     named = {(of, name) for of, name in later if name in ("name", "properties", "materials")}
-    inside = {(of, name) for of, name in later if of in (Material, Wind, NoFlyZone, Matrix)}
+    inside = {(of, name) for of, name in later if of in (Material, Wind, NoFlyZone, Matrix, Base)}
     assert set(USED) == later - named - inside
     assert not uses_world(plain())
     for (of, name), value in USED.items():

@@ -102,8 +102,8 @@ def random_plan(problem: Problem, rng: np.random.Generator) -> Plan:
     for _ in range(problem.max_steps):
         row = []
         for i in range(problem.n_uavs):
-            rules = [simulator.verdict(arrays, episodes, 0, i, j) for j in range(problem.n_targets)]
-            allowed = [j for j, rule in enumerate(rules) if rule == visit.ALLOWED]
+            stops = [j for j in range(problem.n_targets + 1 + problem.n_bases) if j != problem.n_targets]
+            allowed = [j for j in stops if simulator.verdict(arrays, episodes, 0, i, j) == visit.ALLOWED]
             stays = not allowed or rng.random() < 0.15
             row.append(problem.n_targets if stays else int(rng.choice(allowed)))
             simulator.act(arrays, episodes, 0, i, row[-1])

@@ -23,7 +23,7 @@ def weight_of(problem):
     if problem.get("matrices"):
         tables = [matrix["distance"] for matrix in problem["matrices"].values()]
         return 1 / (max(leg or 0.0 for table in tables for row in table for leg in row) or 1.0)
-    points = [(t["x"], t["y"]) for t in problem["targets"]]
+    points = [(stop["x"], stop["y"]) for stop in [*problem["targets"], *(problem.get("bases") or ())]]
     for uav in problem["uavs"]:
         points += [(uav["x_s"], uav["y_s"]), now(uav)]
     xs, ys = zip(*points, strict=True)
@@ -57,7 +57,14 @@ class Aircraft:
         self.clock = record.get("available_from") or 0.0
         self.aloft = record.get("airborne") or 0.0
         self.on_ground = self.at == home_of(record) and not self.flown and not self.aloft
+        full = record.get("full_load")
+        self.full = [float(amount) for amount in (record["loadlist"] if full is None else full)]
+        self.reloaded = False
         self.stops = []
+
+    def may_use(self, base):
+        """Whether it may land at a base, and reload there."""
+        return self.record.get("bases") is None or base["id"] in self.record["bases"]
 
     def usable(self, name):
         """What may be used of its range or endurance; infinite where there is no limit."""
@@ -112,17 +119,31 @@ class Replay:
             [without(amount, 0.0, whole) for amount, whole in zip(area["loadlist"], row, strict=True)]
             for area, row in zip(self.areas, self.asked, strict=True)
         ]
+        self.bases = problem.get("bases") or ()
+        self.stocks = [
+            [float("inf")] * len(self.asked[0]) if base.get("stock") is None else list(base["stock"])
+            for base in self.bases
+        ]
         self.satisfaction = self.distance = 0.0
 
     def way_home(self, craft, at):
         """The leg home; one of nothing where it need not return, None where it must and cannot."""
         if not self.objective.get("return_to_base", True):
             return Leg(0.0, 0.0, 0.0)
-        return self.legs.leg(craft.record, at, home_of(craft.record))
+        return self.way_to_nearest(craft, at)
+
+    def way_to_nearest(self, craft, at):
+        """The leg to the starting point or, if that is nearer in the air, to a base that it may use."""
+        best = self.legs.leg(craft.record, at, home_of(craft.record))
+        for base in self.bases:
+            leg = self.legs.leg(craft.record, at, place_of(base)) if craft.may_use(base) else None
+            if leg is not None and (best is None or leg.air < best.air):
+                best = leg
+        return best
 
     def land(self, craft):
         """Fly home for good, which costs its length where that is charged."""
-        leg = self.legs.leg(craft.record, craft.at, home_of(craft.record))
+        leg = self.way_to_nearest(craft, craft.at)
         if craft.out and self.objective.get("charge_return", False) and leg is not None:
             self.distance += leg.ground
         craft.out = False
@@ -131,6 +152,45 @@ class Replay:
         """When it has landed, from where it is at the end of its visits."""
         home = self.way_home(craft, craft.at)
         return craft.clock + (home.time if home else 0.0)
+
+    def reload(self, s, i, d):
+        """Let UAV `i` land at base `d` in step `s`, and take up what it lacks; raises Illegal."""
+        craft, base, stock = self.fleet[i], self.bases[d], self.stocks[d]
+        if not craft.out:
+            raise Illegal(s, i, "returning")
+        leg = self.legs.leg(craft.record, craft.at, place_of(base))
+        if leg is None or not craft.may_use(base):
+            raise Illegal(s, i, "barred")
+        if craft.flown + leg.air > craft.usable("voyage") * (1 + TOLERANCE):
+            raise Illegal(s, i, "range")
+        if len(craft.stops) < len(craft.record.get("committed") or ()):
+            raise Illegal(s, i, "committed")
+        if craft.reloaded:
+            raise Illegal(s, i, "reloaded")
+        if craft.aloft + leg.time > craft.usable("endurance") * (1 + TOLERANCE):
+            raise Illegal(s, i, "endurance")
+        departure = craft.clock + leg.time + (base.get("turnaround") or 0.0)
+        if departure > latest(craft.record.get("available_until")):
+            raise Illegal(s, i, "landing")
+        arrival, craft.clock, craft.flown, craft.aloft = craft.clock + leg.time, departure, 0.0, 0.0
+        craft.at, craft.place, craft.reloaded = place_of(base), (base["x"], base["y"]), True
+        self.distance += leg.ground
+        loaded = [
+            max(0.0, min(full - have, there))
+            for full, have, there in zip(craft.full, craft.hold, stock, strict=True)
+        ]
+        craft.hold = [have + more for have, more in zip(craft.hold, loaded, strict=True)]
+        self.stocks[d] = [there - gone for there, gone in zip(stock, loaded, strict=True)]
+        craft.stops.append(
+            {
+                "step": s + 1,
+                "base": d,
+                "arrival_time": arrival,
+                "departure_time": departure,
+                "distance": leg.ground,
+                "loaded": loaded,
+            }
+        )
 
     def visit(self, s, i, j, given):
         """Fly UAV `i` to area `j` in step `s`; raises Illegal."""
@@ -157,14 +217,14 @@ class Replay:
             raise Illegal(s, i, "committed")
         begin = max(arrival, area.get("earliest") or 0.0)
         end = begin + (area.get("service_time") or 0.0)
-        waits_on_ground = craft.on_ground and not craft.stops
+        waits_on_ground = craft.reloaded or (craft.on_ground and not craft.stops)
         aloft = craft.aloft + (end - craft.clock) - (begin - arrival if waits_on_ground else 0.0)
         if aloft + home.time > craft.usable("endurance") * (1 + TOLERANCE):
             raise Illegal(s, i, "endurance")
         if end + home.time > latest(craft.record.get("available_until")):
             raise Illegal(s, i, "landing")
         craft.clock, craft.flown, craft.aloft = end, craft.flown + leg.air, aloft
-        craft.at, craft.place = there, (area["x"], area["y"])
+        craft.at, craft.place, craft.reloaded = there, (area["x"], area["y"]), False
         self.distance += leg.ground
         self.unload(craft, j, unloaded, begin)
         endurance = craft.record.get("endurance")
@@ -192,7 +252,8 @@ class Replay:
                 gained = amount + ((self.objective.get("minimum_weight") or 1.0) - 1.0) * first * asked[k]
                 worth = 1.0 if half_life is None else 2.0 ** (-begin / half_life)
                 self.satisfaction += area["level"] * gained / sum(asked) * worth
-            craft.hold[k] = without(craft.hold[k], amount, craft.loaded[k])
+            most = max(craft.loaded[k], craft.full[k]) if self.bases else craft.loaded[k]
+            craft.hold[k] = without(craft.hold[k], amount, most)
             wanted[k] = without(wanted[k], amount, asked[k])
 
 
@@ -208,10 +269,12 @@ def replay(problem, assignment, delivered=None, legs=None):
     visited = set()
     for s, row in enumerate(assignment):
         for i, (craft, choice) in enumerate(zip(flight.fleet, row, strict=True)):
-            if not 0 <= choice <= n:
+            if not 0 <= choice <= n + len(flight.bases):
                 raise Illegal(s, i, "action")
             if choice == n:
                 flight.land(craft)
+            elif choice > n:
+                flight.reload(s, i, choice - n - 1)
             else:
                 flight.visit(s, i, choice, None if delivered is None else delivered[s][i])
                 visited.add((i, choice))
@@ -230,6 +293,7 @@ def replay(problem, assignment, delivered=None, legs=None):
         "distance": flight.distance,
         "distance_weight": weight,
         "remaining": flight.needs,
+        "stocks": flight.stocks,
         "makespan": makespan,
         "changes": changes,
         "stops": [craft.stops for craft in flight.fleet],

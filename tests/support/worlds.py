@@ -9,7 +9,7 @@ from problems import random_problem
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
 from app.domain.problem import Problem
-from app.domain.surroundings import NoFlyZone, Wind
+from app.domain.surroundings import Base, NoFlyZone, Wind
 
 
 def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
@@ -27,6 +27,44 @@ def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int =
     if rng.random() < 0.6:
         problem = replace(problem, no_fly_zones=_zones(problem, rng))
     return problem
+
+
+def random_sorties(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
+    """The same with one or two bases; some UAVs begin empty, some may not use all of them."""
+    problem = random_world(rng, max_uavs, max_targets)
+    across = problem.extent / float(np.median([uav.speed for uav in problem.uavs]))
+    places = [(uav.x_s, uav.y_s, uav.location) for uav in problem.uavs]
+    places += [(target.x, target.y, target.location) for target in problem.targets]
+    bases = []
+    for number in range(int(rng.integers(1, 3))):
+        x, y, row = places[int(rng.integers(0, len(places)))]
+        if problem.matrices is None and rng.random() < 0.6:
+            x, y = (float((here + there) / 2) for here, there in zip((x, y), places[0][:2], strict=True))
+        stock = tuple(float(amount) for amount in rng.integers(0, 9, problem.n_materials))
+        bases.append(
+            Base(
+                f"base-{number + 1}",
+                x,
+                y,
+                stock=stock if rng.random() < 0.6 else None,
+                turnaround=across * float(rng.uniform(0, 0.3)) if rng.random() < 0.6 else 0.0,
+                location=row,
+            )
+        )
+    ids = [base.id for base in bases]
+    uavs = tuple(
+        replace(
+            uav,
+            loadlist=(0.0,) * problem.n_materials if rng.random() < 0.3 else uav.loadlist,
+            full_load=tuple(map(float, rng.integers(0, 9, problem.n_materials)))
+            if rng.random() < 0.5
+            else None,
+            bases=tuple(ids[: int(rng.integers(0, len(ids) + 1))]) if rng.random() < 0.3 else None,
+            voyage=uav.voyage * (0.5 if rng.random() < 0.5 else 1.0),
+        )
+        for uav in problem.uavs
+    )
+    return replace(problem, uavs=uavs, bases=tuple(bases))
 
 
 def _timed(problem: Problem, rng: np.random.Generator, across: float) -> Problem:

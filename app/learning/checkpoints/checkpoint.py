@@ -265,7 +265,17 @@ def _universal_values(policy: UniversalPolicy, _: UniversalConfig, problem: Prob
 
     A part of the task will do, since every size fits.
     """
-    part = replace(problem, uavs=problem.uavs[:_CHECKED_UAVS], targets=problem.targets[:_CHECKED_TARGETS])
+    # Without what refers to the rest.
+    part = replace(
+        problem,
+        uavs=tuple(
+            replace(uav, committed=(), excluded=(), bases=None) for uav in problem.uavs[:_CHECKED_UAVS]
+        ),
+        targets=problem.targets[:_CHECKED_TARGETS],
+        bases=(),
+        start_plan=None,
+        objective=replace(problem.objective, change_weight=0.0),
+    )
     arrays = compile_problem(part)
     plans = np.full((1, part.max_steps, part.n_uavs), part.n_targets, np.int64)
     rows = greedy_plan(part).as_array()

@@ -11,8 +11,14 @@ from app.domain.problem import Problem
 from app.learning.paper.architecture import TARGET_FIELDS, UAV_FIELDS, NetworkSizes
 from app.learning.paper.exploration import explore
 from app.learning.paper.observations import Float32s, features_of, write_states
-from app.simulation.arrays import Flags, Floats, Integers, compile_problem
+from app.simulation.arrays import (
+    Flags,
+    Floats,
+    Integers,
+    compile_problem,
+)
 from app.simulation.simulator import allowed_actions, new_episodes, reset
+from app.simulation.stacks import without_reloads
 
 
 class Environment(Protocol):
@@ -73,7 +79,7 @@ class SwarmEnvironment:
     def __init__(self, problem: Problem) -> None:
         self.sizes = swarm_sizes(problem)
         self.max_steps = problem.max_steps
-        self._arrays = compile_problem(problem)
+        self._arrays = without_reloads(compile_problem(problem))
         self._features = features_of(problem)
         self._episodes = new_episodes(self._arrays, 1)
         self._reward = np.zeros(1)

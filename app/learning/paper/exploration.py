@@ -12,7 +12,13 @@ from dataclasses import dataclass
 
 from app.learning.paper.observations import Float32s
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import Episodes, act, compiled, end_step, verdict
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
+from app.simulation.simulator import (
+    act,
+    end_step,
+    verdict,
+)
 from app.simulation.visit import ALLOWED
 
 

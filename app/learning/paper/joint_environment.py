@@ -10,17 +10,23 @@ from app.domain.problem import Problem
 from app.learning.paper.architecture import NetworkSizes
 from app.learning.paper.environment import swarm_sizes
 from app.learning.paper.observations import Float32s, features_of, write_states
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, compile_problem
+from app.simulation.arrays import (
+    Flags,
+    Floats,
+    Integers,
+    ProblemArrays,
+    compile_problem,
+)
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes, copy_episode
 from app.simulation.simulator import (
-    Episodes,
     act,
-    compiled,
-    copy_episode,
     end_step,
     new_episodes,
     reset,
     verdict,
 )
+from app.simulation.stacks import without_reloads
 from app.simulation.visit import ALLOWED
 
 MAX_JOINT_ACTIONS = 20_000
@@ -149,7 +155,7 @@ class JointEnvironment:
         self.sizes = NetworkSizes(1, count_joint_actions(problem), swarm_sizes(problem).state_features, 0)
         self.max_steps = problem.max_steps
         self._base = problem.n_targets + 1
-        self._arrays = compile_problem(problem)
+        self._arrays = without_reloads(compile_problem(problem))
         self._features = features_of(problem)
         self._episodes = new_episodes(self._arrays, 1)
         self._scratch = new_episodes(self._arrays, problem.n_uavs)

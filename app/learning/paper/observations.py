@@ -15,7 +15,8 @@ import numpy.typing as npt
 from app.domain.problem import Problem
 from app.learning.paper.architecture import TARGET_FIELDS, UAV_FIELDS
 from app.library.description import task_description
-from app.simulation.simulator import Episodes, compiled
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.visit import START
 
 Float32s = npt.NDArray[np.float32]

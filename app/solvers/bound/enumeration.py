@@ -9,7 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
-from app.simulation.simulator import Episodes, act, close, compiled, copy_episode, new_episodes, verdict
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes, copy_episode
+from app.simulation.simulator import (
+    act,
+    close,
+    new_episodes,
+    verdict,
+)
 from app.simulation.visit import ALLOWED
 from app.simulation.worth import most_earned_by
 from app.solvers.local_search.annealing import ROUNDING

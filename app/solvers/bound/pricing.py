@@ -6,7 +6,7 @@ import numpy as np
 
 from app.simulation.arrays import Floats, Integers
 from app.simulation.compilation import njit
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.solvers.bound.target_sets import Members
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled, compiled_nogil
+from app.simulation.decorators import compiled, compiled_nogil
 from app.simulation.visit import airborne, ready
 from app.solvers.column_generation.pool import Pool, collect
 from app.solvers.column_generation.resources import VehicleResources

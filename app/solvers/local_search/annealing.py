@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled, compiled_nogil
+from app.simulation.decorators import compiled, compiled_nogil
 from app.solvers.column_generation.pool import Pool, collect, new_pool
 from app.solvers.local_search.ceiling import most_satisfaction
 from app.solvers.local_search.change import (

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled
 from app.simulation.heap import pop, push
-from app.simulation.simulator import compiled
 from app.simulation.visit import is_base, left_of, loaded_of, most_carried
 from app.simulation.worth import (
     bonus_of,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.simulation.arrays import NONE
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.solvers.local_search.change import Change, propose
 from app.solvers.local_search.neighbourhood import Neighbourhood, base_after, draw
 from app.solvers.local_search.routes import Routes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.simulation.arrays import NONE
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.solvers.local_search.change import Change, propose
 from app.solvers.local_search.flights import draw_flight_move
 from app.solvers.local_search.neighbourhood import Neighbourhood, draw, target_after

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import Flags, Integers, ProblemArrays
+from app.simulation.decorators import compiled
 from app.simulation.legs import UNREACHABLE
-from app.simulation.simulator import compiled
 from app.simulation.visit import START, leg, way_home
 from app.simulation.worth import cost_of, earned_by
 from app.solvers.local_search.routes import Routes

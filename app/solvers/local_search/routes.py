@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
-from app.simulation.simulator import compiled
+from app.simulation.decorators import compiled
 from app.simulation.visit import (
     START,
     air_length,

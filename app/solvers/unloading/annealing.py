@@ -13,8 +13,8 @@ import numpy as np
 
 from app.domain.plan import Actions
 from app.simulation.arrays import NONE, Floats, ProblemArrays
+from app.simulation.decorators import compiled, compiled_nogil
 from app.simulation.deliveries import Unloading, Visits, new_unloading, serve
-from app.simulation.simulator import compiled, compiled_nogil
 from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
 from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, feasible, undo
 from app.solvers.local_search.moves import draw_move

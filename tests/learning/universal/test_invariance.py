@@ -8,8 +8,9 @@ import pytest
 from app.domain.plan import Plan
 from app.domain.problem import Objective
 from app.learning.universal.episodes.rollout import play
-from app.simulation.arrays import compile_problem, stack
+from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
+from app.simulation.stacks import stack
 
 
 def greedy(policy, problem):

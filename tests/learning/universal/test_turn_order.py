@@ -12,9 +12,10 @@ from app.learning.universal.episodes.turn_order import (
     restore_plans,
     some_orders,
 )
-from app.simulation.arrays import compile_problem, stack
+from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.simulation.replay import replay as replayed
+from app.simulation.stacks import stack
 
 
 def test_a_plan_earns_the_same_under_other_indices(make_policy):

@@ -17,8 +17,15 @@ import numpy as np
 from app.learning.compute.kernels import Float32s
 from app.learning.universal.network.architecture import RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.decorators import compiled
+from app.simulation.episodes import Episodes
 from app.simulation.legs import UNREACHABLE
-from app.simulation.simulator import Episodes, compiled, earned_now, leg_home, leg_to, verdict
+from app.simulation.simulator import (
+    earned_now,
+    leg_home,
+    leg_to,
+    verdict,
+)
 from app.simulation.visit import (
     ALLOWED,
     air_length,

@@ -24,7 +24,13 @@ from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATU
 from app.learning.universal.network.inference import ask_together, attention_bias, compile_agent
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, close, end_step, new_episodes
+from app.simulation.episodes import Episodes
+from app.simulation.simulator import (
+    act,
+    close,
+    end_step,
+    new_episodes,
+)
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 

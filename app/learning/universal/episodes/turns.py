@@ -17,7 +17,12 @@ from app.learning.universal.episodes.observation import (
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, end_step, new_episodes
+from app.simulation.episodes import Episodes
+from app.simulation.simulator import (
+    act,
+    end_step,
+    new_episodes,
+)
 
 
 class Turns(NamedTuple):

@@ -18,8 +18,12 @@ from app.learning.universal.network.architecture import HEADS, WIDEST, Universal
 from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.request.recombination import Recombination
-from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.arrays import (
+    ProblemArrays,
+    compile_problem,
+)
 from app.simulation.simulator import new_episodes
+from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
 from app.solvers.seeds import seed_sequence
@@ -50,7 +54,8 @@ class UniversalFromScratch:
         width = min(WIDEST, -(-parameters.drqn_hidden_dim // HEADS) * HEADS)
         self._parameters = parameters.in_service().model_copy(update={"drqn_hidden_dim": width})
         self._config = UniversalConfig(width=width, qmix_hidden_dim=parameters.qmix_hidden_dim)
-        self._arrays = compile_problem(problem)
+        # The networks know no reloads.
+        self._arrays = without_reloads(compile_problem(problem))
         self._best = BestPlan(self._arrays)
         self._history = History()
         initial, episodes = seed_sequence(seed).spawn(2)
@@ -71,7 +76,8 @@ class UniversalFromScratch:
             # Nobody can fly anywhere, so there is nothing to learn.
             self._history.add(0, self._best.reward)
             return self._solution(0)
-        self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
+        if not self._problem.bases:
+            self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
         self._evaluate(0)
         temperature = Temperature(self._arrays)
         recombination = Recombination(self._arrays, self._best)

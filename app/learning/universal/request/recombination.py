@@ -16,8 +16,9 @@ from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.routes import fly_last, fly_routes
 from app.simulation.arrays import Integers, ProblemArrays
 from app.simulation.compilation import njit
+from app.simulation.episodes import Episodes
 from app.simulation.evaluation import rewards_of
-from app.simulation.simulator import Episodes, new_episodes
+from app.simulation.simulator import new_episodes
 from app.simulation.visit import ALLOWED
 from app.solvers.protocol import StopCriterion
 

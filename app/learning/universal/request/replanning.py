@@ -16,9 +16,22 @@ import numpy as np
 from app.learning.universal.episodes.rollout import exploration, play
 from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
-from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, part
+from app.simulation.arrays import (
+    Flags,
+    Floats,
+    Integers,
+    ProblemArrays,
+)
 from app.simulation.compilation import njit
-from app.simulation.simulator import Episodes, act, earned_now, new_episodes, reset_one, verdict
+from app.simulation.episodes import Episodes
+from app.simulation.simulator import (
+    act,
+    earned_now,
+    new_episodes,
+    reset_one,
+    verdict,
+)
+from app.simulation.stacks import part
 from app.simulation.visit import (
     ALLOWED,
     COMMITTED_ELSEWHERE,

@@ -28,8 +28,12 @@ from app.learning.universal.request.fine_tuning import FineTuning, require_memor
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.recombination import Recombination
 from app.learning.universal.request.replanning import replan, round_of
-from app.simulation.arrays import Integers, compile_problem
+from app.simulation.arrays import (
+    Integers,
+    compile_problem,
+)
 from app.simulation.simulator import new_episodes
+from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion, no_spare_threads
 from app.solvers.seeds import seed_sequence
@@ -82,7 +86,9 @@ class UniversalTransfer:
     ) -> None:
         self._spare = spare
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
-        self._arrays = compile_problem(problem)
+        # The policy knows no reloads; the search that polishes its plans does.
+        self._whole = compile_problem(problem)
+        self._arrays = without_reloads(self._whole)
         self._effort = effort(self._arrays)
         self._used = fill_in(parameters, self._effort)
         self._asked_once = parameters.orders == 1
@@ -105,14 +111,17 @@ class UniversalTransfer:
         used, checkpoint = self._used, None
         if used.n_epochs:
             require_memory(self._arrays)
-        if new_episodes(self._arrays, 1).done[0]:
+        grounded = bool(new_episodes(self._arrays, 1).done[0])
+        if grounded and not self._problem.bases:
             # Nobody can fly anywhere: every policy would stay at home.
             self._history.add(0, self._best.reward)
             return Solution(self._best.plan, self._history, used.parameters, sources[0].policy)
-        if not used.is_bare:
-            self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
+        by_rule = None if used.is_bare else greedy_plan(self._problem, self._stop).as_array()[None]
+        if by_rule is not None and not self._problem.bases:
+            self._best.consider(by_rule)
         source = None
-        if self._effort.policy or used.is_bare or used.parameters.source is not None:
+        policy_plays = self._effort.policy or used.is_bare or used.parameters.source is not None
+        if policy_plays and not grounded:
             source, reward = self._roll_out(sources)
             self._history.add(0, reward)
             self._tell("roll-out", 1.0)
@@ -122,8 +131,13 @@ class UniversalTransfer:
             checkpoint = self._fine_tune(policy)
         else:
             self._history.add(0, self._best.reward)
+        if self._problem.bases:
+            played, self._best = self._best.actions, BestPlan(self._whole)
+            self._best.consider(played[None])
+            if by_rule is not None:
+                self._best.consider(by_rule)
         polish(
-            self._arrays,
+            self._whole,
             self._best,
             used.polish_moves,
             self._polishing,

@@ -16,8 +16,14 @@ from app.learning.universal.episodes.rollout import play_in_orders
 from app.learning.universal.episodes.turn_order import some_orders
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.training.curriculum import Shard, draw_shard
-from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem, stack
+from app.simulation.arrays import (
+    Floats,
+    Integers,
+    ProblemArrays,
+    compile_problem,
+)
 from app.simulation.generator import FAMILIES
+from app.simulation.stacks import stack
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import actions_of, anneal, new_search, set_routes
 from app.solvers.scale import largest_level
