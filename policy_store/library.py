@@ -223,7 +223,13 @@ class PolicyLibrary:
         return data
 
     def nearest(
-        self, space: str, vector: npt.ArrayLike, k: int, architecture: str | None = None
+        self,
+        space: str,
+        vector: npt.ArrayLike,
+        k: int,
+        architecture: str | None = None,
+        *,
+        without: str | None = None,
     ) -> list[Neighbour]:
         """Find the policies whose source tasks are most similar (Algorithm 2, lines 1 to 6).
 
@@ -237,6 +243,8 @@ class PolicyLibrary:
             How many at most, at least 1.
         architecture
             Only policies of this architecture.
+        without
+            No policies of this architecture.
 
         Returns
         -------
@@ -261,8 +269,13 @@ class PolicyLibrary:
             ids, matrix = known.ids, known.matrix
             if len(query) != matrix.shape[1]:
                 raise InvalidVector(space, f"it has {len(query)} numbers, the space has {matrix.shape[1]}")
-            if architecture is not None:
-                chosen = np.flatnonzero(known.architectures == architecture)
+            if architecture is not None or without is not None:
+                wanted = np.ones(len(ids), np.bool_)
+                if architecture is not None:
+                    wanted &= known.architectures == architecture
+                if without is not None:
+                    wanted &= known.architectures != without
+                chosen = np.flatnonzero(wanted)
                 ids, matrix = tuple(ids[index] for index in chosen), matrix[chosen]
             indices, distances = similarity.nearest(matrix, query, k)
             near = [ids[index] for index in indices]

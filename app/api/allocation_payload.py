@@ -9,7 +9,7 @@ from app.api.problem_models import to_problem
 from app.api.services import Services
 from app.domain.records import problem_to_record
 from app.settings import Settings
-from app.solvers.registry import parse_parameters
+from app.solvers.registry import parse_parameters, require_supported
 
 
 def allocation_payload(body: AllocationRequest, services: Services) -> dict[str, Any]:
@@ -32,14 +32,17 @@ def payload_of(body: AllocationRequest, settings: Settings, library_url: str) ->
     Raises
     ------
     ProblemTooLarge, InvalidProblem
-        As :func:`app.api.problem_models.to_problem` does.
+        As :func:`app.api.problem_models.to_problem` does, or if the algorithm cannot take a field.
     UnknownAlgorithm, InvalidParameters
         If there is no such algorithm, or its parameters are unknown or out of range.
     """
+    problem = to_problem(body, settings)
+    parameters = parse_parameters(body.algorithm, body.parameters)
+    require_supported(body.algorithm, parameters, problem)
     payload = {
-        "problem": problem_to_record(to_problem(body, settings)),
+        "problem": problem_to_record(problem),
         "algorithm": body.algorithm,
-        "parameters": parse_parameters(body.algorithm, body.parameters).model_dump(mode="json"),
+        "parameters": parameters.model_dump(mode="json"),
         "seed": body.seed,
         "library_url": library_url,
     }

@@ -84,6 +84,10 @@ ALLOCATION_EXAMPLES: dict[str, Example] = {
         summary="A real case: what Cyclone Idai left to be done around Beira, answered within two seconds",
         value={**example_problem("cyclone-idai"), "algorithm": "auto", "time_limit_s": 2},
     ),
+    "cyclone-freddy": Example(
+        summary="No-fly zones, wind and opening hours: towns of southern Malawi after Cyclone Freddy",
+        value={**example_problem("cyclone-freddy"), "algorithm": "auto", "time_limit_s": 2},
+    ),
     "planned-unloading": Example(
         summary="How much a visit unloads is decided with the plan; with a bound on what any plan earns",
         value={

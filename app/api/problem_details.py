@@ -78,7 +78,7 @@ MEANINGS: Mapping[str, str] = {
     "unsupported-media-type": "The body is not sent as plain application/json",
     "invalid-request": "Fields or parameters are missing, unknown, of another type or out of range",
     "invalid-cursor": "No page has given this cursor out",
-    "invalid-problem": "The problem breaks a rule between its fields",
+    "invalid-problem": "The problem breaks a rule between its fields, or has one that the algorithm refuses",
     "illegal-plan": "The plan that was sent breaks a rule of the problem",
     "unknown-algorithm": "No algorithm has this name",
     "invalid-parameters": "The algorithm has no such parameters, or not with these values",

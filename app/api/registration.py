@@ -14,11 +14,12 @@ from app.domain.errors import (
     AllocatorError,
     InvalidCheckpoint,
     InvalidParameters,
+    InvalidProblem,
     UnknownAlgorithm,
     Violation,
 )
 from app.domain.records import problem_to_record
-from app.solvers.registry import ALGORITHMS, algorithm, parse_parameters
+from app.solvers.registry import ALGORITHMS, algorithm, parse_parameters, require_supported
 
 _BASE64_BYTES, _BASE64_CHARACTERS = 3, 4
 
@@ -32,6 +33,8 @@ def training_payload(body: RegisterTraining, services: Services) -> dict[str, An
         If there is no such algorithm, or it does not learn.
     InvalidParameters
         If its parameters are unknown or out of range.
+    InvalidProblem
+        If it cannot take a field of the task.
     """
     task, train = to_problem(body.task, services.settings, "/task"), body.train
     try:
@@ -40,6 +43,10 @@ def training_payload(body: RegisterTraining, services: Services) -> dict[str, An
         parameters = parse_parameters(train.algorithm, train.parameters)
     except (UnknownAlgorithm, InvalidParameters) as error:
         raise _inside("/train", error) from None
+    try:
+        require_supported(train.algorithm, parameters, task)
+    except InvalidProblem as error:
+        raise _inside("/task", error) from None
     return {
         "name": body.name,
         "problem": problem_to_record(task),

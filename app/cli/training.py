@@ -42,7 +42,7 @@ def train(
         Executor, typer.Option(help="local: processes of this machine; ray: the cluster of the settings.")
     ] = Executor.LOCAL,
 ) -> None:
-    """Train the source tasks of the paper's sizes and of the bundled examples into a library.
+    """Train source tasks of the paper's sizes, and of the examples that paper mode takes, into a library.
 
     A run that was interrupted goes on where it stopped.
     """

@@ -19,6 +19,7 @@ from app.domain.problem import Problem
 from app.domain.records import problem_to_record
 from app.learning.checkpoints.checkpoint import read_metadata, with_name
 from app.learning.cluster_training import train_on_cluster
+from app.learning.paper.observed import unobserved
 from app.learning.parameters import QmixParameters
 from app.learning.source_training import SEED, train_source
 from app.simulation.generator import generate
@@ -68,15 +69,23 @@ class SourceProgress:
 
 
 def example_shapes() -> list[Shape]:
-    """List the sizes of the bundled examples."""
+    """List the sizes of the bundled examples, but for those that the paper's networks cannot take."""
     shapes = []
     for file in sorted((resources.files("app") / "examples").iterdir(), key=lambda item: item.name):
         if file.name.endswith(".json"):
             problem = json.loads(file.read_text(encoding="utf-8"))
-            shapes.append(
-                (len(problem["uavs"]), len(problem["targets"]), len(problem["uavs"][0]["loadlist"]))
-            )
+            if not any(_says(problem, *name.split(".")) for name in unobserved()):
+                shapes.append(
+                    (len(problem["uavs"]), len(problem["targets"]), len(problem["uavs"][0]["loadlist"]))
+                )
     return shapes
+
+
+def _says(part: Any, name: str, *inner: str) -> bool:
+    """Return whether a request, or a part of it, has a field, or its parts have an inner one."""
+    if isinstance(part, list):
+        return any(_says(each, name, *inner) for each in part)
+    return name in part and (not inner or _says(part[name], *inner))
 
 
 def source_tasks(
@@ -87,7 +96,7 @@ def source_tasks(
     Parameters
     ----------
     shapes
-        Sizes (M, N, K); by default the paper's and those of the bundled examples.
+        Sizes (M, N, K); by default the paper's and those of the bundled examples that paper mode takes.
     families
         Names in :data:`app.simulation.generator.FAMILIES`.
 

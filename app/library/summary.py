@@ -5,17 +5,22 @@ K can be compared, and the same task with its UAVs in another order is another t
 numbers that depends neither on sizes being equal, nor on the order of UAVs, targets or materials, nor on
 units, nor on where on the map the task lies. Every number is a share, a bounded ratio or a logarithm of a
 size, so that none decides alone; tasks are as far apart as the sum of squared differences says.
+
+Of the world beyond places, loads and deadlines it has what changes one of these numbers: reserve and
+endurance shorten the range, skills and exclusions leave fewer pairs in range. ``README.md`` says why there
+are no more.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import distances, unrolled
-from app.domain.problem import TOLERANCE, Problem
+from app.domain.problem import TOLERANCE, UAV, Problem
 
 SUMMARY_SPACE = "task-summary-1"
 """Kind and version of the features; tasks of every size share it."""
@@ -73,7 +78,7 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
         Shape (28,), finite; see :data:`FEATURES`.
     """
     uavs, targets = problem.uavs, problem.targets
-    extent = problem.extent
+    extent, across = problem.extent, _straight(problem).extent
     out = np.array([not u.ret for u in uavs])
     load = np.array([u.loadlist for u in uavs]) * out[:, None]  # (M, K) what can still be delivered
     need = np.array([t.need for t in targets])  # (N, K)
@@ -89,11 +94,15 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
     home = distances(problem.crs, start, area) if problem.objective.return_to_base else 0.0
     voyage = np.array([u.voyage for u in uavs])
     flown = np.array([u.dis for u in uavs])
-    left = np.maximum(voyage - flown, 0.0)
-    reach = flown[:, None] + to_target + home
-    in_range = (reach <= voyage[:, None] * (1.0 + TOLERANCE)) & out[:, None] & wanted[None, :]
-
     speed = np.array([u.speed for u in uavs])
+    usable = np.array([_usable_range(u) for u in uavs])
+    left = np.maximum(usable - flown, 0.0)
+    # Where legs are from matrices they are taken to be as long as positions say, in their own unit.
+    unit = extent / across
+    reach = flown[:, None] + to_target * unit + home * unit
+    in_range = (reach <= usable[:, None] * (1.0 + TOLERANCE)) & out[:, None] & wanted[None, :]
+    in_range &= _may_visit(problem)
+
     crossing = extent / speed.mean()
     level = np.array([t.urgency for t in targets])
     deadlines = np.array([t.deadline for t in targets if t.deadline is not None])
@@ -111,11 +120,11 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
         "load_dispersion": _dispersion(load.sum(axis=1)),
         "need_dispersion": _dispersion(need.sum(axis=1)),
         "level_dispersion": _dispersion(level),
-        "base_spread": _mean_distance(problem, start) / extent,
-        "target_spread": float(apart.mean()) / extent,
-        "target_clustering": min(_nearest_neighbour(apart) * math.sqrt(len(apart)) / extent, 1.0),
+        "base_spread": _mean_distance(problem, start) / across,
+        "target_spread": float(apart.mean()) / across,
+        "target_clustering": min(_nearest_neighbour(apart) * math.sqrt(len(apart)) / across, 1.0),
         "target_elongation": _elongation(problem, area),
-        "base_to_target": float(to_target.mean()) / extent,
+        "base_to_target": float(to_target.mean()) / across,
         "range": _against(left.mean(), extent),
         "range_dispersion": _dispersion(left),
         "pairs_in_range": _share(in_range.sum(), out.sum() * wanted.sum()),
@@ -127,11 +136,41 @@ def task_summary(problem: Problem) -> npt.NDArray[np.float64]:
         "deadline_tightness": _against(crossing, time_allowed),
         "service_time": _against(service.mean(), crossing),
         "mission_progress": _share(np.minimum(flown, voyage).sum(), voyage.sum()),
-        "displacement": min(float(moved.mean()) / extent, 1.0),
+        "displacement": min(float(moved.mean()) / across, 1.0),
         "returning_share": 1.0 - float(out.mean()),
         "objective": 0.5 * problem.objective.return_to_base + 0.5 * (not problem.objective.charge_return),
     }
     return np.array([features[name] for name in FEATURES], dtype=np.float64)
+
+
+def _straight(problem: Problem) -> Problem:
+    """Return the task with legs between positions, which with matrices may have a size of their own."""
+    if problem.matrices is None:
+        return problem
+    uavs = tuple(replace(u, location=None, home_location=None, profile=None) for u in problem.uavs)
+    targets = tuple(replace(t, location=None) for t in problem.targets)
+    return replace(problem, uavs=uavs, targets=targets, matrices=None)
+
+
+def _usable_range(uav: UAV) -> float:
+    """Return how long the whole flight of a UAV can be, by its range and by its endurance."""
+    share = 1.0 - uav.reserve
+    by_range = uav.voyage * share
+    if uav.endurance is None:
+        return by_range
+    return min(by_range, uav.dis + (uav.endurance * share - uav.airborne) * uav.speed)
+
+
+def _may_visit(problem: Problem) -> npt.NDArray[np.bool_]:
+    """Return (M, N) whether each UAV may be sent to each target, by skills and exclusions."""
+    allowed = np.ones((problem.n_uavs, problem.n_targets), np.bool_)
+    needed = [set(t.skills) for t in problem.targets]
+    if any(needed):
+        allowed &= [[each <= set(u.skills) for each in needed] for u in problem.uavs]
+    place = {t.id: j for j, t in enumerate(problem.targets)}
+    for i, uav in enumerate(problem.uavs):
+        allowed[i, [place[identifier] for identifier in uav.excluded]] = False
+    return allowed
 
 
 def _against(a: float, b: float) -> float:

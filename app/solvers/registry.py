@@ -6,14 +6,16 @@ torch nor compiled code, so the web process can do it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, cast
+from typing import Any, NamedTuple, cast, get_args
 
 from pydantic import ValidationError
 
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
+from app.domain.problem import Problem
+from app.domain.world_use import require_unused, used_fields
 from app.field_errors import in_words
 from app.solvers.protocol import STORED, Parameters, Solver, SolverContext
 
@@ -22,6 +24,33 @@ _FLOOR = "app.solvers.floor:Floor"
 
 _PLANNED_UNLOADING = "app.solvers.unloading.solver:PlannedUnloading"
 """Lends every algorithm the unloading that is planned."""
+
+_UNOBSERVED = "app.learning.paper.observed:unobserved"
+"""Which fields of a problem the paper's networks cannot take, and why."""
+
+_PAPERS_NETWORKS = "app.learning.paper.architecture:QMIX_PAPER_1"
+"""Architecture of policies that the paper's networks are."""
+
+_PAPER = "paper"
+"""The mode that is the paper's."""
+
+
+class Unsupported(NamedTuple):
+    """A field of a problem that an algorithm refuses.
+
+    Attributes
+    ----------
+    field
+        As the specification writes it, such as ``objective.half_life``.
+    mode
+        In which mode of the algorithm; None where it has none.
+    reason
+        Why, and what to do instead.
+    """
+
+    field: str
+    mode: str | None
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +72,9 @@ class Algorithm:
     papers
         Whether it is one of the paper's own in every mode. Its answers are compared with the greedy rule's,
         so they are its own also where they earn less.
+    observes
+        Whether it learns by the paper's observation: always, or in paper mode where it has one. Then it
+        refuses fields of a problem whose reward does not follow from what is observed.
     """
 
     name: str
@@ -51,10 +83,24 @@ class Algorithm:
     parameters: str
     learns: bool = False
     papers: bool = False
+    observes: bool = False
 
     def parameter_model(self) -> type[Parameters]:
         """Return the class of its parameters."""
         return cast(type[Parameters], _resolve(self.parameters))
+
+    def unsupported(self) -> Iterator[Unsupported]:
+        """Yield what it refuses of a problem, mode by mode."""
+        field = self.parameter_model().model_fields.get("mode")
+        for mode in (None,) if field is None else get_args(field.annotation):
+            for name, reason in self.unsupported_in(mode).items():
+                yield Unsupported(name, mode, reason)
+
+    def unsupported_in(self, mode: str | None) -> Mapping[str, str]:
+        """Return the fields that it refuses in a mode, None where it has none, each with the reason."""
+        if not self.observes or mode not in (None, _PAPER):
+            return {}
+        return cast(Mapping[str, str], _resolve(_UNOBSERVED)())
 
 
 ALGORITHMS: Mapping[str, Algorithm] = {
@@ -66,6 +112,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "app.learning.transfer:TransferQmix",
             "app.learning.parameters:TransferQmixParameters",
             learns=True,
+            observes=True,
         ),
         Algorithm(
             "qmix",
@@ -73,6 +120,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "app.learning.qmix:Qmix",
             "app.learning.parameters:QmixParameters",
             learns=True,
+            observes=True,
         ),
         Algorithm(
             "dqn",
@@ -80,6 +128,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "app.learning.dqn:Dqn",
             "app.learning.parameters:DqnParameters",
             papers=True,
+            observes=True,
         ),
         Algorithm(
             "ga",
@@ -167,6 +216,32 @@ def parse_parameters(name: str, given: Mapping[str, Any], *, stored: bool = Fals
         ) from None
 
 
+def require_supported(name: str, parameters: Parameters, problem: Problem) -> None:
+    """Refuse a problem that uses a field that an algorithm cannot take.
+
+    Raises
+    ------
+    UnknownAlgorithm
+        If there is no such algorithm.
+    InvalidProblem
+        With a violation for every such field, which says what to do instead.
+    """
+    require_unused(problem, algorithm(name).unsupported_in(_mode_of(parameters)))
+
+
+def unusable_architecture(problem: Problem) -> str | None:
+    """Return the architecture whose policies cannot serve a problem, because they do not observe all of it.
+
+    Returns
+    -------
+    str or None
+        That of the paper's networks, or None where every policy can serve it.
+    """
+    unobserved = _resolve(_UNOBSERVED)()
+    unusable = any(used.name in unobserved for used in used_fields(problem))
+    return cast(str, _resolve(_PAPERS_NETWORKS)) if unusable else None
+
+
 def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
     """Load an algorithm's implementation and build it, able to plan the unloading too.
 
@@ -180,9 +255,13 @@ def create_solver(name: str, parameters: Parameters, context: SolverContext) -> 
     """
     line = algorithm(name)
     solver = _resolve(line.solver)(parameters, context)
-    papers = line.papers or getattr(parameters, "mode", None) == "paper"
+    papers = line.papers or _mode_of(parameters) == _PAPER
     floored = _resolve(_FLOOR)(solver, parameters, greedy=not papers, learns=line.learns)
     return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored))
+
+
+def _mode_of(parameters: Parameters) -> str | None:
+    return getattr(parameters, "mode", None)
 
 
 def _resolve(dotted: str) -> Any:

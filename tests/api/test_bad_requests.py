@@ -125,6 +125,52 @@ def test_not_a_number_among_the_parameters(client, problem):
     assert refusal(response, 422, "invalid-parameters")["errors"][0]["pointer"] == "/parameters/mutation_rate"
 
 
+ZONE = {"polygon": [[0.4, 0.4], [0.6, 0.4], [0.5, 0.6]]}
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "parameters"),
+    [("qmix", {"mode": "paper"}), ("transfer_qmix", {"mode": "paper"}), ("dqn", {})],
+)
+def test_field_that_the_algorithm_cannot_take_is_named(client, problem, algorithm, parameters):
+    listed = {each["name"]: each["unsupported"] for each in client.get("/algorithms").json()["algorithms"]}
+    reasons = {each["field"]: each["reason"] for each in listed[algorithm]}
+    world = {**problem, "no_fly_zones": [ZONE], "objective": {"half_life": 2.0}}
+    chosen = {"algorithm": algorithm, "parameters": parameters}
+
+    refused = refusal(client.post("/allocate", json={**world, **chosen}), 422, "invalid-problem")
+
+    told = {each["pointer"]: each["detail"] for each in refused["errors"]}
+    assert told == {
+        "/no_fly_zones": reasons["no_fly_zones"],
+        "/objective/half_life": reasons["objective.half_life"],
+    }
+    assert all("`auto` takes it" in detail for detail in told.values())
+    taken = client.post("/allocate", json={**world, "algorithm": "auto", "time_limit_s": 1})
+    assert taken.status_code == 200, taken.text
+
+
+def test_what_service_mode_leaves_to_the_papers_learner_is_refused_the_same_way(client, problem):
+    """Where a problem is too large for the networks for every size, which only a worker sees."""
+    large = {**problem, "uavs": 8 * problem["uavs"], "targets": 5 * problem["targets"]}
+    for name, stem in (("uavs", "u"), ("targets", "t")):
+        large[name] = [{**each, "id": f"{stem}{i}"} for i, each in enumerate(large[name])]
+    body = {**large, "no_fly_zones": [ZONE], "algorithm": "qmix", "parameters": {"n_epochs": 1}}
+
+    refused = refusal(client.post("/allocate", json=body), 422, "invalid-problem")
+
+    assert [each["pointer"] for each in refused["errors"]] == ["/no_fly_zones"]
+
+
+def test_training_that_cannot_take_a_field_of_its_task_is_refused(client, problem):
+    body = {"name": "a town", "task": {**problem, "no_fly_zones": [ZONE]}}
+    train = {"algorithm": "qmix", "parameters": {"mode": "paper", "n_epochs": 1}}
+
+    refused = refusal(client.post("/library", json={**body, "train": train}), 422, "invalid-problem")
+
+    assert [each["pointer"] for each in refused["errors"]] == ["/task/no_fly_zones"]
+
+
 def test_unknown_algorithm_is_told_which_there_are(client, problem):
     refused = refusal(
         client.post("/allocate", json={**problem, "algorithm": "magic"}), 422, "unknown-algorithm"

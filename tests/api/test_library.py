@@ -150,6 +150,30 @@ def test_similar_tasks_are_found_whatever_their_size(client, policy):
     assert wrong.status_code == 422
 
 
+def test_policies_that_cannot_serve_a_task_are_not_offered(client, policy):
+    """One for one size is offered to a task with wind, and to none with a zone."""
+
+    def offered(similarity, **world):
+        asked = {"task": {**TASK, **world}, "k": 100, "similarity": similarity}
+        found = client.post("/library/similar", json=asked).json()["similar"]
+        return {item["policy"]["id"]: item["policy"]["architecture"] for item in found}
+
+    zone = [{"polygon": [[0.4, 0.4], [0.5, 0.4], [0.45, 0.5]]}]
+    for similarity in ("summary", "paper"):
+        assert policy["id"] in offered(similarity, wind={"speed": 0.1, "towards": 90})
+        assert policy["id"] not in offered(similarity, no_fly_zones=zone)
+    assert set(offered("summary", no_fly_zones=zone).values()) == {"qmix-universal-1"}
+    body = {
+        **TASK,
+        "no_fly_zones": zone,
+        "algorithm": "transfer_qmix",
+        "parameters": {"source": policy["id"]},
+    }
+    refused = client.post("/allocate", json=body)
+    assert (refused.status_code, refused.json()["type"]) == (422, "invalid-parameters")
+    assert refused.json()["errors"][0]["pointer"] == "/parameters/source"
+
+
 def test_transfer_by_the_paper_needs_the_same_size(client, policy):
     three = {**TASK, "uavs": [*TASK["uavs"], TASK["uavs"][0]]}
 

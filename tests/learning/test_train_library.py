@@ -17,6 +17,7 @@ def test_source_tasks_cover_the_papers_sizes_and_the_examples():
     shapes = {(t.problem.n_uavs, t.problem.n_targets, t.problem.n_materials) for t in tasks}
     assert shapes == {*PAPER_SHAPES, *example_shapes()}
     assert {(5, 10, 3), (20, 30, 3), (11, 19, 1)} <= shapes
+    assert (8, 15, 2) not in shapes, "the example with no-fly zones, which paper mode refuses"
     assert len({task.id for task in tasks}) == len(tasks) == 2 * len(shapes)
     assert source_tasks() == tasks, "generated from a fixed seed"
     alone = source_tasks([(5, 10, 3)])

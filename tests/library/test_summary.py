@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from problems import on_earth, random_problem
+from worlds import random_world
 
 from app.domain.problem import Objective
 from app.library.summary import FEATURES, task_summary
@@ -133,3 +134,46 @@ def test_sizes_count(size, near):
     rng = np.random.default_rng(9)
     known = generate("uniform", 10, 20, 3, rng)
     assert (distance(generate("uniform", *size, rng), known) < 0.1) == near
+
+
+def test_endurance_and_reserve_are_a_shorter_range():
+    problem = generate("uniform", 4, 8, 2, np.random.default_rng(10))
+
+    def with_all(**fields):
+        return replace(problem, uavs=tuple(replace(u, **fields) for u in problem.uavs))
+
+    halved = replace(problem, uavs=tuple(replace(u, voyage=u.voyage / 2) for u in problem.uavs))
+    timed = replace(problem, uavs=tuple(replace(u, endurance=u.voyage / u.speed / 2) for u in problem.uavs))
+    for task in (with_all(reserve=0.5), timed):
+        np.testing.assert_allclose(task_summary(task), task_summary(halved), atol=1e-12)
+    assert distance(problem, halved) > 0.01
+    assert (task_summary(with_all(endurance=1e9)) == task_summary(problem)).all()
+    in_the_air = with_all(endurance=1.0, airborne=1.0)
+    assert task_summary(in_the_air)[FEATURES.index("range")] == 0.0
+
+
+def test_pairs_that_may_not_be_flown_are_not_in_range():
+    problem = generate("single_base", 3, 5, 2, np.random.default_rng(11))
+    problem = replace(problem, uavs=tuple(replace(u, voyage=100.0) for u in problem.uavs))
+
+    def share(task):
+        return task_summary(task)[FEATURES.index("pairs_in_range")]
+
+    first, *others = problem.uavs
+    excluded = replace(first, excluded=(problem.targets[0].id, problem.targets[1].id))
+    skilled = replace(problem.targets[4], skills=("winch",))
+    assert share(problem) == 1.0
+    assert share(replace(problem, uavs=(excluded, *others))) == pytest.approx(13 / 15)
+    barred = replace(problem, targets=(*problem.targets[:4], skilled))
+    assert share(barred) == pytest.approx(12 / 15)
+    can = replace(barred, uavs=(replace(first, skills=("winch",)), *others))
+    assert share(can) == pytest.approx(13 / 15)
+
+
+def test_bounded_and_finite_whatever_the_world():
+    rng = np.random.default_rng(12)
+    for _ in range(200):
+        summary = task_summary(random_world(rng))
+        assert np.isfinite(summary).all()
+        assert (summary >= 0).all()
+        assert (summary <= 1 + 1e-12).all()

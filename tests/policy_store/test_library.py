@@ -296,6 +296,20 @@ def test_neighbours_of_one_architecture(library: PolicyLibrary, new_policy) -> N
     found = library.nearest(SPACE, [0, 0], 2, "a-longer-name-than-the-first")
     assert [n.policy.name for n in found] == ["far"]
     assert library.nearest(SPACE, [0, 0], 2, "unknown") == []
+    assert library.nearest(SPACE, [0, 0], 2, "unknown", without="unknown") == []
+
+
+def test_neighbours_without_an_architecture(library: PolicyLibrary, new_policy) -> None:
+    library.add(new_policy(name="near", vectors={SPACE: [0, 0]}, architecture="one-size-1"))
+    library.add(new_policy(name="far", vectors={SPACE: [5, 0]}, architecture="every-size-1"))
+
+    def names(**which: str) -> list[str]:
+        return [n.policy.name for n in library.nearest(SPACE, [0, 0], 1, **which)]
+
+    assert names() == ["near"]
+    assert names(without="one-size-1") == ["far"], "the one that is left out takes no place"
+    assert names(architecture="one-size-1", without="one-size-1") == []
+    assert names(architecture="every-size-1", without="one-size-1") == ["far"]
 
 
 def test_another_librarys_changes_are_seen(url: str, library: PolicyLibrary, new_policy) -> None:

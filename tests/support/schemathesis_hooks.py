@@ -82,6 +82,15 @@ def has_wrong_parameters(asked, default):
     return False
 
 
+def is_beyond_observation(problem, asked, default):
+    """Say whether a problem has what the paper's learners, if one is asked for, do not observe."""
+    papers = asked.get("algorithm", default) == "dqn" or asked.get("parameters", {}).get("mode") == "paper"
+    objective = problem.get("objective") or {}
+    unseen = [problem.get(name) for name in ("no_fly_zones", "matrices")]
+    unseen += [objective.get(name) for name in ("half_life", "makespan_weight", "change_weight")]
+    return papers and any(unseen)
+
+
 def is_no_checkpoint(text):
     """Say whether a text in base64 is no safetensors file with the description of a checkpoint in it."""
     try:
@@ -101,7 +110,8 @@ def breaks_rule_beyond_schemas(case, kind):
     if kind == "invalid-problem":
         rows = body.get("assignment", ()) if case.path == "/evaluate" else ()
         uneven = any(len(row) != len(body["uavs"]) for row in rows)
-        return uneven or (problem is not None and breaks_rules(problem))
+        beyond = asked is not None and problem is not None and is_beyond_observation(problem, asked, default)
+        return uneven or beyond or (problem is not None and breaks_rules(problem))
     if kind == "illegal-plan":
         return is_illegal(body, body["assignment"] if case.path == "/evaluate" else body["start_plan"])
     if kind == "invalid-parameters":

@@ -14,12 +14,23 @@ from app.solvers.registry import ALGORITHMS, Algorithm
 router = APIRouter(tags=["allocation"])
 
 
+class UnsupportedModel(AnswerModel):
+    """A field of a problem that an algorithm refuses."""
+
+    field: str = Field(description="Its name, such as `no_fly_zones` or `objective.half_life`")
+    mode: str | None = Field(description="In which `mode` of the algorithm; null: it has none")
+    reason: str = Field(description="Why, and what to do instead")
+
+
 class AlgorithmModel(AnswerModel):
     """One algorithm."""
 
     name: str = Field(description="As `algorithm` in `POST /allocate`")
     summary: str = Field(description="What it does")
     learns: bool = Field(description="Whether the library can hold what it learns")
+    unsupported: list[UnsupportedModel] = Field(
+        description="Fields of a problem that it refuses with 422; it takes all others"
+    )
     parameters: dict[str, Any] = Field(description="JSON schema of its parameters")
     defaults: dict[str, Any] = Field(description="Its parameters where none are given")
 
@@ -32,7 +43,7 @@ class AlgorithmList(AnswerModel):
 
 @router.get("/algorithms", summary="List the algorithms", response_model=AlgorithmList, responses=responses())
 def list_algorithms() -> AlgorithmList:
-    """List the algorithms with their parameters: schema, limits, defaults."""
+    """List the algorithms: parameters with schema, limits and defaults, and fields that they refuse."""
     return AlgorithmList(algorithms=[_describe(algorithm) for algorithm in ALGORITHMS.values()])
 
 
@@ -42,6 +53,7 @@ def _describe(algorithm: Algorithm) -> AlgorithmModel:
         name=algorithm.name,
         summary=algorithm.summary,
         learns=algorithm.learns,
+        unsupported=[UnsupportedModel(**each._asdict()) for each in algorithm.unsupported()],
         parameters=model.model_json_schema(),
         defaults=model().model_dump(mode="json"),
     )

@@ -32,6 +32,7 @@ from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey, PolicyId
 from app.api.services import Served
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
+from app.solvers.registry import unusable_architecture
 
 router = APIRouter(prefix="/library", route_class=JsonRoute, tags=["library"])
 
@@ -130,13 +131,18 @@ def list_policies(
 def find_similar(
     body: Annotated[SimilarRequest, Body(openapi_examples=SIMILAR_EXAMPLES)], services: Served
 ) -> SimilarList:
-    """Compare a task with the source tasks (lines 1 to 6 of Algorithm 2), nearest first."""
+    """Compare a task with the source tasks (lines 1 to 6 of Algorithm 2), nearest first.
+
+    Policies that cannot serve the task are left out: those for one size, where it uses a field that paper
+    mode refuses (`GET /algorithms`).
+    """
     task = to_problem(body.task, services.settings, "/task")
     if body.similarity == "paper":
         space, vector = description_space(task), task_description(task)
     else:
         space, vector = SUMMARY_SPACE, task_summary(task)
-    return similar_list(services.library.nearest(space, vector, body.k))
+    without = unusable_architecture(task)
+    return similar_list(services.library.nearest(space, vector, body.k, without=without))
 
 
 @router.get(

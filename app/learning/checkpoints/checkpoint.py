@@ -20,7 +20,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 import app
-from app.domain.errors import InvalidCheckpoint
+from app.domain.errors import InvalidCheckpoint, InvalidProblem
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
 from app.learning.paper import architecture as paper
@@ -250,7 +250,10 @@ def _paper_values(network: QmixNetwork, config: QmixConfig, problem: Problem) ->
             f"its networks are for {config.n_uavs} UAVs, {config.n_targets} targets and {config.n_materials} "
             f"materials, the task has {sizes[0]}, {sizes[1]} and {sizes[2]}"
         )
-    environment = SwarmEnvironment(problem)
+    try:
+        environment = SwarmEnvironment(problem)
+    except InvalidProblem as error:
+        raise InvalidCheckpoint(f"its networks do not observe the task: {error}") from error
     record = EpisodeRecord(environment.sizes, 1)
     environment.observe(record.states[0], record.allowed[0])
     with torch.inference_mode():

@@ -30,6 +30,7 @@ from app.learning.universal.network.policy import UniversalPolicy
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from app.solvers.protocol import SourcePolicy
+from app.solvers.registry import unusable_architecture
 from policy_store.database import Database
 from policy_store.errors import PolicyNotFound, PolicyStoreError
 from policy_store.library import PolicyLibrary
@@ -158,6 +159,11 @@ class SourcePolicies:
                 )
             distance = _distance(vectors[SUMMARY_SPACE], task_summary(problem))
             return _named(library, policy, distance, UniversalPolicy)
+        if policy.architecture == unusable_architecture(problem):
+            raise _bad_source(
+                f"policy {policy_id!r} ({policy.architecture}) does not observe all that the problem uses; "
+                "policies for every size do"
+            )
         space = description_space(problem)
         same = any_size or policy.metadata.get("config") == config.as_record()
         fits = policy.architecture == QMIX_PAPER_1 and _size(policy) == _size(problem) and same

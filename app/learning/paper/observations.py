@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.problem import Problem
+from app.domain.world_use import require_unused
 from app.learning.paper.architecture import TARGET_FIELDS, UAV_FIELDS
+from app.learning.paper.observed import unobserved
 from app.library.description import task_description
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
@@ -45,7 +47,14 @@ class Features(NamedTuple):
 
 
 def features_of(problem: Problem) -> Features:
-    """Describe a problem for :func:`write_states`."""
+    """Describe a problem for :func:`write_states`.
+
+    Raises
+    ------
+    InvalidProblem
+        If its reward does not follow from what is observed; :mod:`app.learning.paper.observed`.
+    """
+    require_unused(problem, unobserved())
     m, n, k = problem.n_uavs, problem.n_targets, problem.n_materials
     description = task_description(problem).astype(np.float32)
     n_own = m * (UAV_FIELDS + k)

@@ -1,0 +1,65 @@
+"""Which problems the paper's learners can take: those whose reward follows from what their networks observe.
+
+What a visit earns and costs must follow from Eqs. 10 to 13: loads, needs, levels, positions, distance flown.
+What is allowed need not: the masks say so at every turn, as they always did of deadlines. A field is refused
+unless it is named here, so one that is new is refused until somebody has looked. ``ALGORITHMS.md`` has the
+reasons field by field. Nothing here needs torch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+from app.domain.world_use import later_fields
+
+_TAKEN = frozenset(
+    {
+        # What is allowed: the masks keep it.
+        "uavs.endurance",
+        "uavs.airborne",
+        "uavs.reserve",
+        "uavs.available_from",
+        "uavs.available_until",
+        "uavs.capacity",
+        "uavs.skills",
+        "uavs.excluded",
+        "uavs.committed",
+        "targets.earliest",
+        "targets.skills",
+        # Range is counted in air length, which is what `dis` is too; the reward is by length over ground.
+        "wind",
+        # What a material earns, by the share of a need that is left; the need is observed.
+        "objective.minimum_share",
+        "objective.minimum_weight",
+        # By itself a plan that no answer is below.
+        "start_plan",
+        # Nothing without `matrices`.
+        "uavs.location",
+        "uavs.home_location",
+        "uavs.profile",
+        "targets.location",
+    }
+)
+
+_NO_CLOCK = "the reward depends on the clock, which Eqs. 10 to 13 do not have"
+_REASONS = {
+    "no_fly_zones": "the reward counts the way round a zone, which positions do not tell",
+    "matrices": "the reward counts legs of a table, and the positions that are observed are for display",
+    "objective.half_life": _NO_CLOCK,
+    "objective.makespan_weight": _NO_CLOCK,
+    "objective.change_weight": "the reward depends on which visits of `start_plan` were made, which Eqs. 10 "
+    "to 13 do not have",
+}
+_UNKNOWN = "the paper's observation (Eq. 13) and actions (section 3.2.3) have no place for it"
+
+
+@cache
+def unobserved() -> Mapping[str, str]:
+    """Return the fields that are refused, by their names, each with why and what to do instead."""
+    return {
+        name: f"the paper's learners cannot take `{name.rpartition('.')[2]}`: {_REASONS.get(name, _UNKNOWN)}"
+        "; `auto` takes it"
+        for name in later_fields()
+        if name not in _TAKEN
+    }
