@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from app.domain.matrices import Matrix
-from app.domain.problem import UAV, Problem, Target
-from app.domain.surroundings import NoFlyZone, Wind
-from app.simulation.generator import Family, uniform
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.surroundings import Base, NoFlyZone, Wind
+from app.simulation.generator import Family, single_base, uniform
+
+_LIGHT = Objective(distance_weight=0.3)
 
 _SKILLS = ("cold chain", "winch", "night flight")
 
@@ -106,6 +108,48 @@ def matrix(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generat
     return replace(problem, uavs=uavs, targets=targets, matrices=matrices)
 
 
+def sorties(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `single_base`, where UAVs come back, reload, and fly again: small loads, short ranges, one day."""
+    problem = single_base(n_uavs, n_targets, n_materials, rng)
+    x, y = problem.uavs[0].x_s, problem.uavs[0].y_s
+    uavs = tuple(
+        replace(
+            u,
+            voyage=float(rng.uniform(1.0, 2.0)),
+            loadlist=tuple(map(float, rng.integers(1, 6, n_materials))),
+            available_until=float(rng.uniform(4, 8)),
+        )
+        for u in problem.uavs
+    )
+    base = Base("base-1", x, y, turnaround=0.1)
+    return replace(problem, uavs=uavs, bases=(base,), max_steps=15, objective=_LIGHT)
+
+
+def stock(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `sorties` from several bases, whose stocks run out; some UAVs begin empty, some keep to a base."""
+    problem = sorties(n_uavs, n_targets, n_materials, rng)
+    needed = np.array([t.loadlist for t in problem.targets]).sum(axis=0)
+    bases = tuple(
+        Base(
+            f"base-{number + 1}",
+            *map(float, rng.random(2)),
+            stock=tuple(np.round(needed * rng.uniform(0.1, 0.3, n_materials)).tolist()),
+            turnaround=float(rng.uniform(0.05, 0.25)),
+        )
+        for number in range(3)
+    )
+    uavs = tuple(
+        replace(
+            u,
+            full_load=tuple(map(float, rng.integers(1, 6, n_materials))),
+            loadlist=(0.0,) * n_materials if rng.random() < 0.3 else u.loadlist,
+            bases=(str(rng.choice([base.id for base in bases])),) if rng.random() < 0.3 else None,
+        )
+        for u in problem.uavs
+    )
+    return replace(problem, uavs=uavs, bases=bases)
+
+
 def _whole_needs(problem: Problem, rng: np.random.Generator) -> Problem:
     """Let every UAV carry enough for all that it can visit, so that areas are visited once or not at all."""
     most = sum(sorted((sum(t.loadlist) for t in problem.targets), reverse=True)[: problem.max_steps])
@@ -128,6 +172,6 @@ def _zone(problem: Problem, number: int, rng: np.random.Generator) -> NoFlyZone:
 
 
 WORLD_FAMILIES: Mapping[str, Family] = {
-    each.__name__: each for each in (windows, zones, windy, promised, fair, partly, matrix)
+    each.__name__: each for each in (windows, zones, windy, promised, fair, partly, matrix, sorties, stock)
 }
 """The families by name."""

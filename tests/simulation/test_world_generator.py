@@ -15,6 +15,8 @@ HAS = {
     "promised": lambda p: any(t.skills for t in p.targets) and any(u.excluded for u in p.uavs),
     "partly": lambda p: any(t.requested != t.loadlist for t in p.targets) and p.objective.minimum_share,
     "matrix": lambda p: {u.profile for u in p.uavs} == set(p.matrices),
+    "sorties": lambda p: len(p.bases) == 1 and p.bases[0].stock is None,
+    "stock": lambda p: all(b.stock for b in p.bases) and any(not any(u.loadlist) for u in p.uavs),
     "fair": lambda p: p.objective.half_life and p.objective.minimum_share,
 }
 
