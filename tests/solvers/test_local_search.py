@@ -79,7 +79,7 @@ def test_totals_stay_those_of_the_simulator_through_random_moves():
         set_routes(search, greedy_plan(problem).as_array())
         assert_evaluated(search)
         for _ in range(60):
-            if not draw_move(search.routes, search.near, search.change, rng):
+            if not draw_move(search.arrays, search.routes, search.near, search.change, rng):
                 continue
             if not feasible(search.arrays, search.change):
                 continue
@@ -102,7 +102,7 @@ def test_undoing_leaves_no_trace():
         for _ in range(40):
             before = [each.copy() for each in search.routes]
             lengths = search.routes.length.copy()
-            if not draw_move(search.routes, search.near, search.change, rng):
+            if not draw_move(search.arrays, search.routes, search.near, search.change, rng):
                 continue
             if not feasible(search.arrays, search.change):
                 continue

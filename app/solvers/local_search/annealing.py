@@ -249,7 +249,7 @@ def anneal(
     cooling = math.exp(math.log(cold / hot) / max(moves, 1))
     for _ in range(moves):
         temperature *= cooling
-        if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
+        if not draw_move(arrays, routes, search.near, change, rng) or not feasible(arrays, change):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
         price = (weight + thrift) * extra + haste * extra_time(routes, change) + closing

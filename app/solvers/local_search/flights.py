@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.arrays import NONE
+from app.simulation.arrays import NONE, ProblemArrays
 from app.simulation.decorators import compiled
+from app.simulation.visit import START, leg
 from app.solvers.local_search.change import Change, propose
-from app.solvers.local_search.neighbourhood import Neighbourhood, base_after, draw
+from app.solvers.local_search.neighbourhood import Neighbourhood, base_after, draw, target_after
 from app.solvers.local_search.routes import Routes
+
+_INTO_BEST = 0.4
+"""Probability of a visit at the best place of a route, which may have many."""
 
 _LONGEST = 3
 """Visits that a new flight begins with, at most."""
@@ -16,10 +20,18 @@ _LONGEST = 3
 
 @compiled
 def draw_flight_move(
-    routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator, i: int
+    arrays: ProblemArrays,
+    routes: Routes,
+    near: Neighbourhood,
+    change: Change,
+    rng: np.random.Generator,
+    i: int,
 ) -> bool:
     """Propose a random move about the flights of UAV `i`; False where what was drawn is not possible."""
     kind = rng.random()
+    if routes.length[i] > 1 and kind < _INTO_BEST:
+        return _insert_at_best(arrays, routes, near, change, rng, i)
+    kind = (kind - _INTO_BEST) / (1.0 - _INTO_BEST) if kind >= _INTO_BEST else rng.random()
     s = _draw_reload(routes, near, rng, i)
     if s == NONE:
         return (
@@ -40,6 +52,41 @@ def draw_flight_move(
     if kind < 0.9:
         return _shift_reload(routes, change, rng, i, s)
     return _hand_over(routes, near, change, rng, i, s)
+
+
+@compiled
+def _insert_at_best(
+    arrays: ProblemArrays,
+    routes: Routes,
+    near: Neighbourhood,
+    change: Change,
+    rng: np.random.Generator,
+    i: int,
+) -> bool:
+    """One more visit where the detour is least, to a target near a stop of the route."""
+    length, steps = routes.length[i], routes.target.shape[1]
+    j = target_after(routes, near, rng, i, draw(rng, length + 1))
+    best, s = np.inf, NONE
+    for place in range(min(length + 1, steps)):
+        at = START if place == 0 else routes.target[i, place - 1]
+        if at == j or (place < length and routes.target[i, place] == j):
+            continue
+        detour = leg(arrays, 0, i, at, j)
+        if place < length:
+            following = routes.target[i, place]
+            detour += leg(arrays, 0, i, j, following) - leg(arrays, 0, i, at, following)
+        # Which of those that are nearly as good is drawn, as loads and times count, too.
+        detour *= 0.7 + 0.6 * rng.random()
+        if detour < best:
+            best, s = detour, place
+    if s == NONE:
+        return False
+    new = min(length + 1, steps)
+    change.target[0, s] = j
+    for q in range(s + 1, new):
+        change.target[0, q] = routes.target[i, q - 1]
+    propose(routes, change, 0, i, s, new)
+    return True
 
 
 @compiled

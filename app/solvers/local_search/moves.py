@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.arrays import NONE
+from app.simulation.arrays import NONE, ProblemArrays
 from app.simulation.decorators import compiled
 from app.solvers.local_search.change import Change, propose
 from app.solvers.local_search.flights import draw_flight_move
 from app.solvers.local_search.neighbourhood import Neighbourhood, draw, target_after
 from app.solvers.local_search.routes import Routes
 
-FLIGHT_SHARE = 0.25
+FLIGHT_SHARE = 0.35
 """Probability of a move about reloads, where there are bases."""
 
 
 @compiled
-def draw_move(routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator) -> bool:
+def draw_move(
+    arrays: ProblemArrays, routes: Routes, near: Neighbourhood, change: Change, rng: np.random.Generator
+) -> bool:
     """Propose a random move; False where what was drawn is not possible."""
     change.uav[0], change.uav[1] = NONE, NONE
     i = near.active[draw(rng, len(near.active))]
     if near.near_base.shape[1] > 0 and rng.random() < FLIGHT_SHARE:
-        return draw_flight_move(routes, near, change, rng, i)
+        return draw_flight_move(arrays, routes, near, change, rng, i)
     kind = rng.random()
     if routes.length[i] == 0 and near.reluctant[i] and kind < 0.5:
         return _depart(routes, near, change, rng, i)

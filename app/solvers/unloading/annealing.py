@@ -121,7 +121,7 @@ def anneal_planned(
         tried += 1
         temperature *= cooling
         tally[WORK] += 1.0
-        if not draw_move(routes, search.near, change, rng) or not feasible(arrays, change):
+        if not draw_move(arrays, routes, search.near, change, rng) or not feasible(arrays, change):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
         price = arrays.terms[0].weight * extra + closing
