@@ -1,4 +1,4 @@
-"""Times and promises that were probably not meant: what nobody can keep, whatever the plan."""
+"""Times, promises and wishes that were probably not meant: what nobody can keep, whatever the plan."""
 
 from __future__ import annotations
 
@@ -58,3 +58,6 @@ def odd_times(problem: Problem) -> Iterator[Found]:
             if len(uav.committed) > problem.max_steps
         ],
     )
+    planned = problem.bases and problem.objective.unloading == "planned"
+    says = "with bases, visits unload all that is needed and carried, as greedy unloading does"
+    yield "planned_with_bases", [("/objective/unloading", says)] if planned else []

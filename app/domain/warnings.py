@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import EARTH_RADIUS_KM, distances, unrolled
-from app.domain.problem import TOLERANCE, UAV, Problem
+from app.domain.problem import TOLERANCE, Problem
+from app.domain.supplies import loads_later
 from app.domain.time_warnings import odd_times
 
 Floats = npt.NDArray[np.float64]
@@ -124,9 +125,6 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
     scene = _scene(problem)
     times = [warning for code, places in odd_times(problem) for warning in _some(code, places)]
     found = [*_supplies(scene), *times, *_speeds_and_ranges(scene), *_levels(scene)]
-    if problem.bases and problem.objective.unloading == "planned":
-        says = "with bases, visits unload all that is needed and carried, as greedy unloading does"
-        found.append(ProblemWarning("/objective/unloading", "planned_with_bases", says))
     if problem.matrices is not None:
         # Positions are for display alone.
         return tuple(found)
@@ -159,7 +157,7 @@ def _scene(problem: Problem) -> _Scene:
                 u.voyage,
                 u.dis,
                 u.ret,
-                *(map(max, u.loadlist, _loads_later(problem, u))),
+                *(map(max, u.loadlist, loads_later(problem, u))),
             )
             for u in uavs
         ],
@@ -179,15 +177,6 @@ def _scene(problem: Problem) -> _Scene:
         problem, of_uavs[:, 0:2], of_uavs[:, 2:4], area, ready, wanted, left, of_uavs[:, 7:], need, near_uav,
         near_target,
     )  # fmt: skip
-
-
-def _loads_later(problem: Problem, uav: UAV) -> tuple[float, ...]:
-    """Return the amounts that a UAV can take aboard at some base, at most what it leaves one with."""
-    bases = [base for base in problem.bases if uav.bases is None or base.id in uav.bases]
-    return tuple(
-        amount if any(base.stock is None or base.stock[k] > 0.0 for base in bases) else 0.0
-        for k, amount in enumerate(uav.full)
-    )
 
 
 def _nearest(crs: str, a: Floats, b: Floats, of_a: Flags, of_b: Flags) -> tuple[Floats, Floats]:

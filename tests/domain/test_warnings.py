@@ -13,7 +13,7 @@ from app.api.problem_models import ProblemModel, to_problem
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.domain.surroundings import Wind
+from app.domain.surroundings import Base, Wind
 from app.domain.warnings import CODES, problem_warnings
 from app.settings import Settings
 from app.simulation.generator import FAMILIES, generate
@@ -105,6 +105,11 @@ TROUBLES = {
         with_targets(scene(), lambda t: {"x": 34.84, "y": -19.83}),
         "/targets/0/x",
         "one and the same",
+    ),
+    "planned_with_bases": (
+        replace(scene(unloading="planned"), bases=(Base("base-1", 34.84, -19.83),)),
+        "/objective/unloading",
+        "as greedy unloading does",
     ),
     "range_implausible": (
         with_uavs(scene(), lambda u: {"voyage": 160_000.0}, 1),

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.domain.surroundings import Wind
+from app.domain.problem import Objective
+from app.domain.surroundings import Base, Wind
 from app.simulation.arrays import (
     AXES,
     OF_UAVS,
@@ -16,6 +17,7 @@ from app.simulation.stacks import (
     alike,
     part,
     stack,
+    without_reloads,
 )
 
 SIZES = {"M": 4, "N": 6, "K": 2}
@@ -42,11 +44,21 @@ def windy(problem):
     )
 
 
-@pytest.mark.parametrize("which", ["problem", "windy"])
+@pytest.fixture
+def based(windy):
+    """The same with bases, of which one UAV may not use the second."""
+    bases = (Base("b", 0.2, 0.3), Base("c", 0.9, 0.1, stock=(3.0, 4.0), turnaround=0.5))
+    uavs = (replace(windy.uavs[0], bases=("b",), full_load=(7.0, 8.0)), *windy.uavs[1:])
+    return replace(windy, uavs=uavs, bases=bases)
+
+
+@pytest.mark.parametrize("which", ["problem", "windy", "based"])
 def test_fields_have_the_axes_that_are_declared(which, request):
     given = request.getfixturevalue(which)
     arrays = compile_problem(given)
-    sizes = {**SIZES, "C": len({uav.speed for uav in given.uavs}) if given.wind else 1}
+    d, n = given.n_bases, SIZES["N"]
+    sizes = {**SIZES, "C": len({uav.speed for uav in given.uavs}) if given.wind else 1, "D": d}
+    sizes["L"] = n + 1 + d if d else n
     for name, axes in AXES.items():
         shape = getattr(arrays, name).shape
         declared = tuple(sizes[axis] for axis in axes.names if axis != "X")
@@ -56,7 +68,7 @@ def test_fields_have_the_axes_that_are_declared(which, request):
         assert shape[1 : 1 + len(declared)] == declared or not getattr(arrays, name).size, name
 
 
-@pytest.mark.parametrize("which", ["problem", "windy"])
+@pytest.mark.parametrize("which", ["problem", "windy", "based"])
 def test_a_part_is_what_its_own_problem_compiles_to(which, request):
     problem = request.getfixturevalue(which)
     uavs, targets = [2, 0], [4, 1, 3]
@@ -74,6 +86,16 @@ def test_a_part_is_what_its_own_problem_compiles_to(which, request):
             found["crumb"] = wanted["crumb"]
         assert np.array_equal(found, wanted), name
         assert getattr(parts, name).flags.c_contiguous
+
+
+def test_without_reloads_ways_home_stay(based):
+    arrays, plain = compile_problem(based), without_reloads(compile_problem(based))
+    assert plain.n_bases == 0
+    assert plain.shape == arrays.shape
+    assert np.array_equal(plain.home, arrays.home[:, :, : SIZES["N"]])
+    uavs = tuple(replace(uav, bases=None) for uav in based.uavs)
+    far = compile_problem(replace(based, uavs=uavs, bases=()))
+    assert (plain.home < far.home).any()
 
 
 def test_uavs_that_differ_in_anything_are_not_alike(windy):
@@ -96,6 +118,14 @@ def test_uavs_that_differ_in_anything_are_not_alike(windy):
             else:
                 place[0, 1] = np.where(np.isfinite(place[0, 1]), place[0, 1] + 1, 0)
             assert alike(arrays._replace(**{name: changed})).tolist() == [0, 1, 2, 3], (name, column)
+
+
+def test_problems_with_bases_are_stacked_only_where_they_have_as_many_targets(based):
+    few = compile_problem(replace(based, targets=based.targets[:5], start_plan=None, objective=Objective()))
+    whole = compile_problem(based)
+    assert stack([whole, whole]).shape == whole.shape
+    with pytest.raises(ValueError, match="as many targets"):
+        stack([whole, few])
 
 
 def test_what_pads_a_stack_is_never_part_of_a_visit(problem):
