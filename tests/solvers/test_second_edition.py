@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referee import Illegal, replay
+from referee_legs import Legs
 from worlds import random_world
 
 from app.domain.plan import Plan
@@ -28,7 +29,7 @@ PROBLEMS = 60
 MOST_PLANS = 400
 
 
-def best_plan(body: dict[str, Any]) -> float | None:
+def best_plan(body: dict[str, Any], legs: Legs) -> float | None:
     """The best reward of all plans by the referee; None where they are too many."""
     m, n = len(body["uavs"]), len(body["targets"])
     orders = (itertools.permutations(range(n), k) for k in range(1, body["max_steps"] + 1))
@@ -43,7 +44,7 @@ def best_plan(body: dict[str, Any]) -> float | None:
         own = []
         for route in routes:
             try:
-                replay(body, rows([route if h == i else () for h in range(m)]))
+                replay(body, rows([route if h == i else () for h in range(m)]), legs=legs)
             except Illegal as broken:
                 if broken.args[2] != "useless":
                     continue
@@ -57,7 +58,7 @@ def best_plan(body: dict[str, Any]) -> float | None:
     best = -float("inf")
     for chosen in itertools.product(*possible):
         try:
-            best = max(best, replay(body, rows(chosen))["reward"])
+            best = max(best, replay(body, rows(chosen), legs=legs)["reward"])
         except Illegal:
             continue
     return best
@@ -76,11 +77,12 @@ def test_plans_are_legal_rewards_true_and_bounds_valid(part):
         rng = np.random.default_rng(number)
         problem = random_world(rng, max_uavs=3, max_targets=3)
         body = problem_to_record(problem)
-        rewards = {"greedy": earned(body, problem, greedy_plan(problem))}
+        legs = Legs(body)
+        rewards = {"greedy": earned(body, legs, problem, greedy_plan(problem))}
         for name, solver in solvers.items():
             solution = solver.solve(problem, 1, Deadline(2.0), lambda _: None)
-            rewards[name] = earned(body, problem, solution.plan)
-        best, most = best_plan(body), max(rewards.values())
+            rewards[name] = earned(body, legs, problem, solution.plan)
+        best, most = best_plan(body, legs), max(rewards.values())
         slack = 1e-7 * max(1.0, abs(most))
         assert solution.proof.bound >= most - slack, number
         for known in (None, rewards["local_search"]):
@@ -92,8 +94,8 @@ def test_plans_are_legal_rewards_true_and_bounds_valid(part):
     assert proven > 0.9 * PROBLEMS
 
 
-def earned(body: dict[str, Any], problem: Problem, plan: Plan) -> float:
+def earned(body: dict[str, Any], legs: Legs, problem: Problem, plan: Plan) -> float:
     """The reward of a plan, which the referee confirms."""
     reward = reward_of(problem, plan)
-    assert reward == pytest.approx(replay(body, plan.assignment)["reward"], rel=REL, abs=REL)
+    assert reward == pytest.approx(replay(body, plan.assignment, legs=legs)["reward"], rel=REL, abs=REL)
     return reward
