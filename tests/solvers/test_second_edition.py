@@ -25,7 +25,7 @@ from app.solvers.protocol import SolverContext
 from app.solvers.stop import Deadline
 
 REL = 1e-9
-PROBLEMS = 60
+PROBLEMS = 30
 MOST_PLANS = 400
 
 
