@@ -1,4 +1,8 @@
-"""One service for all tests of this folder: a process with two workers, and small limits."""
+"""Services for the tests of this folder, with small limits: one with two workers for all, and others.
+
+One takes more than ten seconds of a core to start. A test that needs another setting, or ends its service,
+takes one that is there already if it can: `narrow` for few places, the lives of `test_restarts.py` for ends.
+"""
 
 import json
 import os
