@@ -4,9 +4,14 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 from postgresql_server import PostgresqlServer, binaries
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
+
+# An example takes as long as a busy machine lets it.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 ONE_SERVICE = {"tests/api", "tests/dashboard"}
 LONGEST = (
