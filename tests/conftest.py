@@ -4,11 +4,26 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 from postgresql_server import PostgresqlServer, binaries
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 
+# An example takes as long as a busy machine lets it.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
+
 ONE_SERVICE = {"tests/api", "tests/dashboard"}
+LONGEST = (
+    "tests/api/",
+    "tests/dashboard/",
+    "tests/jobs/test_executors.py",
+    "tests/reproduction/test_reproduction.py",
+    "tests/test_readme.py",
+    "tests/test_cli.py",
+    "tests/solvers/test_second_edition.py",
+)
+"""What is begun first, so that no process has much to do when the others have ended."""
 
 HOW_TO_GET_ONE = (
     "no PostgreSQL: 'apt-get install postgresql' and pip install '.[postgres]' "
@@ -26,6 +41,13 @@ class ByService(LoadFileScheduling):
         file = nodeid.partition("::")[0]
         folder = file.rpartition("/")[0]
         return folder if folder in ONE_SERVICE else file
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    def place(item: pytest.Item) -> int:
+        return next((n for n, begin in enumerate(LONGEST) if item.nodeid.startswith(begin)), len(LONGEST))
+
+    items.sort(key=place)
 
 
 @pytest.hookimpl(optionalhook=True)

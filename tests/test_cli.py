@@ -15,7 +15,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from live_service import SMALL
+from live_service import ONE_WORKER
 from sqlalchemy import text
 from typer.testing import CliRunner
 
@@ -130,9 +130,6 @@ def test_others_are_not_served_without_a_usable_key(invoke, revoked):
     assert refused.exit_code == 2
     assert "0.0.0.0" in refused.stderr
     assert "--no-keys" in refused.stderr
-
-
-ONE_WORKER = {f"ALLOCATOR_{name.upper()}": str(value) for name, value in {"workers": 1, **SMALL}.items()}
 
 
 @pytest.fixture

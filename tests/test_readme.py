@@ -1,7 +1,8 @@
 """Every command in README.md and the manuals, run as it stands against the service that `make run` starts.
 
-Only the port is another one, so that a service on the default port is not in the way. `make run` is the
-fixture. Blocks of `console` are not run: they take long, or need a container engine or another machine.
+Only the port is another one, so that a service on the default port is not in the way, and it has one worker
+and small limits, with which it is ready sooner. `make run` is the fixture. Blocks of `console` are not run:
+they take long, or need a container engine or another machine.
 """
 
 import contextlib
@@ -17,6 +18,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from live_service import ONE_WORKER
 from referee import replay
 
 ROOT = Path(__file__).parents[1]
@@ -53,7 +55,7 @@ def port(tmp_path_factory):
     """The port of a service started as the README says."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         free = probe.getsockname()[1]
-    environment = os.environ | {"ALLOCATOR_DATA_DIR": str(tmp_path_factory.mktemp("data"))}
+    environment = os.environ | ONE_WORKER | {"ALLOCATOR_DATA_DIR": str(tmp_path_factory.mktemp("data"))}
     with subprocess.Popen(
         ["make", "run", f"PORT={free}"], cwd=ROOT, env=environment, start_new_session=True
     ) as process:

@@ -256,6 +256,13 @@ def _unloading() -> None:
     tasks.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
 
 
+def _planned_reasons() -> None:
+    """Find reasons, and the amounts that go with them, where unloading is planned."""
+    problem = _small_problem()
+    planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
+    tasks.allocate(_request(planned, "greedy", {}), _unlimited())
+
+
 def _combining() -> None:
     problem = _small_problem()
     problem = replace(problem, uavs=tuple(replace(u, loadlist=(9.0, 9.0)) for u in problem.uavs))
@@ -286,6 +293,9 @@ def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
     _unloading()
     _geography()
     _time_answers(most_uavs, most_targets)
+    if not compiled_here():
+        # It completes answers too. Otherwise workers are about to compile this, and nobody waits for it here.
+        _planned_reasons()
 
 
 def _time_answers(most_uavs: int, most_targets: int) -> None:
@@ -340,6 +350,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "greedy": partial(_algorithm, "greedy"),
     "transfer": _transfer,
     "planned unloading": _unloading,
+    "reasons of planned unloading": _planned_reasons,
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
     "combining": _combining,
     "bound": _bound,

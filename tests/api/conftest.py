@@ -1,4 +1,8 @@
-"""One service for all tests of this folder: a process with two workers, and small limits."""
+"""Services for the tests of this folder, with small limits: one with two workers for all, and others.
+
+One takes more than ten seconds of a core to start. A test that needs another setting, or ends its service,
+takes one that is there already if it can: `narrow` for few places, the lives of `test_restarts.py` for ends.
+"""
 
 import json
 import os
@@ -7,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -74,18 +79,44 @@ def service(tmp_path_factory):
         running.stop()
 
 
-@pytest.fixture
-def start_service(tmp_path):
-    """Starts services on one data folder, and ends those that the test has not ended itself."""
+@pytest.fixture(scope="session")
+def narrow(tmp_path_factory):
+    """A service with one worker, where few problems of batches may wait."""
+    running = Service(tmp_path_factory.mktemp("narrow"), workers=1, queue_limit=10, batch_limit=3)
+    try:
+        yield running.await_ready()
+    finally:
+        running.stop()
+
+
+@contextmanager
+def starting(folder):
+    """Start services on one data folder, and end those that have not ended before."""
     started = []
 
     def start(**settings):
-        started.append(Service(tmp_path, **settings))
+        started.append(Service(folder, **settings))
         return started[-1]
 
-    yield start
-    for each in started:
-        each.stop()
+    try:
+        yield start
+    finally:
+        for each in started:
+            each.stop()
+
+
+@pytest.fixture
+def start_service(tmp_path):
+    """Starts services for one test."""
+    with starting(tmp_path) as start:
+        yield start
+
+
+@pytest.fixture(scope="module")
+def start_for_module(tmp_path_factory):
+    """Starts services for all tests of a module."""
+    with starting(tmp_path_factory.mktemp("data")) as start:
+        yield start
 
 
 @pytest.fixture

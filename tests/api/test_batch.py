@@ -3,9 +3,7 @@
 import json
 import time
 
-import httpx
 import pytest
-from answers import but_for_reasons
 
 
 def lines_of(response):
@@ -62,8 +60,8 @@ def test_a_body_of_the_wrong_shape_is_refused_as_a_whole(client, item):
     assert client.post("/allocate/batch", json={"problems": []}).status_code == 422
 
 
-def test_too_many_are_refused_and_more_than_there_are_places_wait(start_service, item):
-    client = start_service(workers=1, batch_limit=3).await_ready().client
+def test_too_many_are_refused_and_more_than_there_are_places_wait(narrow, item):
+    client = narrow.await_ready().client
     refused = client.post("/allocate/batch", json={"problems": [item] * 4})
     assert (refused.status_code, refused.json()["type"]) == (422, "batch-too-large")
     assert refused.json()["limit"] == 3
@@ -125,29 +123,3 @@ def test_a_batch_whose_client_cannot_come_again_ends_with_it(client, item):
     states = ("queued", "running")
     while any(client.get("/jobs", params={"status": status}).json()["jobs"] for status in states):
         time.sleep(0.05)
-
-
-def test_a_stopped_server_says_what_it_leaves_and_the_next_goes_on(start_service, item):
-    service = start_service(workers=1).await_ready()
-    slow = {**item, "algorithm": "local_search", "parameters": {}, "time_limit_s": 0.5}
-    problems = [{**slow, "seed": seed} for seed in range(6)]
-    headers = {"Idempotency-Key": "over a stop"}
-    with service.client.stream(
-        "POST", "/allocate/batch", json={"problems": problems}, headers=headers
-    ) as response:
-        received = response.iter_lines()
-        first = json.loads(next(received))
-        service.process.terminate()
-        try:
-            rest = [json.loads(line) for line in received]
-        except httpx.TransportError:
-            rest = []  # the server's grace was over before the streams had ended
-    for line in rest:
-        assert "allocation" in line or line["problem"]["type"] == "draining"
-    service.process.wait(30)
-    again = start_service(workers=1).await_ready().client
-    with again.stream("POST", "/allocate/batch", json={"problems": problems}, headers=headers) as response:
-        lines = in_order(lines_of(response))
-    assert all("allocation" in line for line in lines)
-    kept = lines[first["index"]]
-    assert but_for_reasons(kept["allocation"]) == but_for_reasons(first["allocation"])

@@ -10,7 +10,9 @@ SUPPORT = Path(__file__).parents[1] / "support"
 
 
 def test_every_answer_is_as_documented(start_service, tmp_path):
-    service = start_service(queue_limit=64).await_ready()  # its own: source policies are deleted here
+    service = start_service(
+        workers=1, queue_limit=64
+    ).await_ready()  # its own: source policies are deleted here
     report = tmp_path / "report.json"
     process = subprocess.run(
         [

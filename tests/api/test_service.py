@@ -1,16 +1,12 @@
-"""The service as a whole: health, request ids, restarts, its description, what its process does not load."""
+"""The service as a whole: health, request ids, its description, what its process does not load."""
 
 import json
 import re
 import signal
-import socket
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
 
-import httpx
 import pytest
 
 from app.api.openapi_examples import (
@@ -63,98 +59,6 @@ def test_web_process_loads_neither_torch_nor_compiled_code():
     loaded = set(json.loads(done.stdout))
     assert {"fastapi", "sqlalchemy", "numpy"} <= loaded
     assert not {"torch", "numba", "llvmlite"} & loaded
-
-
-def test_restart_keeps_jobs_and_library_and_goes_on_with_what_ran(start_service, problem):
-    before = start_service(workers=1, max_checkpoint_bytes=10**6).await_ready()
-    parameters = {"n_epochs": 4, "batch_size": 2}
-    quick = {**problem, "algorithm": "qmix", "parameters": parameters, "keep_checkpoint": True}
-    answer = before.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json()
-    policy = before.client.post("/library", json={"name": "kept", "job_id": answer["job_id"]}).json()
-    job = before.client.get(f"/jobs/{answer['job_id']}").json()
-    running = before.client.post("/allocate", json={**problem, **LONG}, headers=ASYNC).json()["id"]
-    waiting = before.client.post("/allocate", json={**problem, "algorithm": "greedy"}, headers=ASYNC).json()[
-        "id"
-    ]
-    before.stop(signal.SIGKILL)
-
-    after = start_service(workers=1).await_ready()
-
-    assert after.client.get(f"/jobs/{answer['job_id']}").json() == job
-    assert after.client.get(f"/library/{policy['id']}").json() == policy
-    assert after.client.post("/allocate", json=quick, headers={"Idempotency-Key": "k"}).json() == answer
-    after.client.delete(f"/jobs/{running}")
-    states = {}
-    for identifier in (running, waiting):
-        with after.client.stream("GET", f"/jobs/{identifier}/events") as stream:
-            for _ in stream.iter_lines():
-                pass
-        states[identifier] = after.client.get(f"/jobs/{identifier}").json()["status"]
-    assert states == {running: "cancelled", waiting: "succeeded"}
-    assert after.stop() in ENDED
-
-
-def test_it_takes_jobs_before_it_is_ready_and_a_clean_stop_ends_open_streams(start_service, problem):
-    service = start_service(workers=1)
-    response = service.client.get("/readyz")
-    assert response.status_code in (200, 503)
-    if response.status_code == 503:
-        assert response.json()["type"] == "not-ready"
-        assert response.headers["retry-after"] == "1"
-    assert service.client.post("/allocate", json={**problem, "algorithm": "greedy"}).status_code == 200
-
-    job_id = service.client.post("/allocate", json={**problem, **LONG}, headers=ASYNC).json()["id"]
-    with service.client.stream("GET", f"/jobs/{job_id}/events") as stream:
-        lines = stream.iter_lines()
-        next(lines)
-        service.process.send_signal(signal.SIGTERM)
-        for _ in lines:
-            pass
-    assert service.process.wait(20) in ENDED
-
-
-def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(start_service, problem):
-    service = start_service(workers=1, shutdown_grace_s=6.0).await_ready()
-    url = service.client.base_url
-    answers = {}
-
-    def ask(name, body):
-        with httpx.Client(base_url=url, timeout=60) as client:
-            answers[name] = client.post("/allocate", json=body)
-
-    def ask_for_many():
-        body = {"problems": [{**problem, **LONG}]}
-        with (
-            httpx.Client(base_url=url, timeout=60) as client,
-            client.stream("POST", "/allocate/batch", json=body) as stream,
-        ):
-            answers["batch"] = [json.loads(line) for line in stream.iter_lines()]
-
-    callers = [threading.Thread(target=ask, args=(name, {**problem, **LONG})) for name in ("runs", "waits")]
-    callers.append(threading.Thread(target=ask_for_many))
-    for caller in callers:
-        caller.start()
-    while len(service.client.get("/jobs").json()["jobs"]) < 3:
-        time.sleep(0.01)
-    unfinished = socket.create_connection((url.host, url.port))
-    unfinished.sendall(b"POST /allocate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{")
-    service.client.get("/healthz")  # what was sent before has arrived
-
-    service.process.send_signal(signal.SIGTERM)
-    refused = b""
-    while chunk := unfinished.recv(65536):
-        refused += chunk
-    unfinished.close()
-    for caller in callers:
-        caller.join(60)
-    assert service.process.wait(60) in ENDED
-
-    for name in ("runs", "waits"):
-        assert (answers[name].status_code, answers[name].json()["type"]) == (503, "draining")
-        assert int(answers[name].headers["retry-after"]) > 0
-    assert [line["problem"]["type"] for line in answers["batch"]] == ["draining"]
-    assert refused.startswith(b"HTTP/1.1 503 ")
-    assert b'"type":"draining"' in refused
 
 
 def test_description_is_complete(client):

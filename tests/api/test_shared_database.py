@@ -27,10 +27,11 @@ def server(postgresql):
     own.close()
 
 
-@pytest.fixture
-def two(server, start_service):
+@pytest.fixture(scope="module")
+def two(server, start_for_module):
     url = server.new_database()
-    services = [start_service(workers=1, database_url=url, max_checkpoint_bytes=1_000_000) for _ in range(2)]
+    settings = {"workers": 1, "database_url": url, "max_checkpoint_bytes": 1_000_000}
+    services = [start_for_module(**settings) for _ in range(2)]
     return [service.await_ready() for service in services]
 
 

@@ -42,8 +42,8 @@ def test_a_time_that_is_up_at_once_gives_a_legal_plan(client, algorithm, unloadi
         assert told["reward"] == pytest.approx(greedy["reward"])
 
 
-def test_whoever_waits_is_answered_when_the_time_is_up(start_service, problem):
-    client = start_service(workers=1, queue_limit=10).await_ready().client
+def test_whoever_waits_is_answered_when_the_time_is_up(narrow, problem):
+    client = narrow.await_ready().client
     holder = client.post("/allocate", json=problem | ENDLESS, headers={"Prefer": "respond-async"}).json()
     request = problem | {"algorithm": "transfer_qmix", "time_limit_s": 0.3}
     later = client.post("/allocate", json=request, headers={"Prefer": "respond-async"}).json()

@@ -217,6 +217,8 @@ print(json.dumps([before, compiled(), loaded]))
     ]
     few = Problem(problem.uavs[:2], problem.targets[:4])
     payloads.append(payload("dqn", QMIX, problem_to_record(few)))
+    planned = replace(problem, objective=Objective(unloading="planned"))
+    payloads.append(payload("greedy", {}, problem_to_record(planned)))
     plenty = [replace(uav, loadlist=tuple(1000.0 for _ in uav.loadlist)) for uav in problem.uavs]
     combined = Problem(tuple(plenty), problem.targets)
     payloads.append(payload("local_search", {"moves": 60_000, "restarts": 2}, problem_to_record(combined)))

@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,15 +25,18 @@ HOW_TO_GET_ONE = (
     "(REQUIRE_BROWSER=1 makes this a failure)"
 )
 
+HERE = Path(__file__).parent
+_running = ExitStack()
+"""What has to end with the last test of this folder."""
+
 expect.set_options(timeout=PATIENCE_MS)
 
 
 def pytest_collection_modifyitems(items):
-    here = Path(__file__).parent
     if Path(CHROMIUM).exists() or os.environ.get("REQUIRE_BROWSER") == "1":
         return
     for item in items:
-        if here in item.path.parents and "browser" in getattr(item, "fixturenames", ()):
+        if HERE in item.path.parents and "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.skip(reason=HOW_TO_GET_ONE))
 
 
@@ -59,12 +62,21 @@ def service(tmp_path_factory) -> Iterator[LiveService]:
         running.stop()
 
 
-# Not for the session: Playwright keeps an event loop running in the main thread, where tests of other folders
-# that come next in the same process run loops of their own.
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    with browsing() as started:
-        yield started
+    yield _running.enter_context(browsing())
+    _running.close()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item, nextitem):
+    """End the browser after the last test of this folder.
+
+    Playwright keeps an event loop running in the main thread, where tests of other folders that come next in
+    the same process run loops of their own.
+    """
+    if nextitem is None or HERE not in nextitem.path.parents:
+        _running.close()
 
 
 @pytest.fixture

@@ -136,7 +136,7 @@ def test_only_cursors_of_pages_are_taken(store, cursor):
 ACTIONS = ("claim", "succeed", "fail", "crash", "requeue", "cancel", "recover", "progress")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.sampled_from(ACTIONS), st.integers(0, 1), st.integers(0, 2)), max_size=25))
 def test_no_order_of_events_finishes_a_job_twice(steps):
     with TemporaryDirectory() as folder:

@@ -114,7 +114,7 @@ def test_mixer_is_the_monotonic_network_written_out():
     torch.testing.assert_close(mixer(values, states), expected)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 2**32), scale=st.sampled_from([0.1, 1.0, 30.0]), data=st.data())
 def test_mixer_never_falls_when_an_agents_value_rises(seed, scale, data):
     generator = torch.Generator().manual_seed(seed)
@@ -135,7 +135,7 @@ def test_mixer_never_falls_when_an_agents_value_rises(seed, scale, data):
     assert (after >= before - 1e-4 * before.abs().clamp(min=1.0)).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     m=st.integers(1, 6), n=st.integers(1, 8), k=st.integers(1, 4), h=st.integers(1, 20), e=st.integers(1, 20)
 )

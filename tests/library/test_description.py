@@ -44,7 +44,7 @@ def test_length_and_range(seed):
     assert (description >= 0).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     length=st.floats(1e-3, 1e3),

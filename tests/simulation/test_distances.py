@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.domain.geometry import distance
@@ -32,13 +32,11 @@ def check(crs, a, b):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=0)
 
 
-@settings(deadline=None)
 @given(points(PLANE, PLANE), points(PLANE, PLANE))
 def test_planar_distances(a, b):
     check("local", a, b)
 
 
-@settings(deadline=None)
 @given(points(LONGITUDE, LATITUDE), points(LONGITUDE, LATITUDE))
 def test_great_circles(a, b):
     check("wgs84", a, b)

@@ -132,7 +132,7 @@ def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
         scale = max(float(search.arrays.areas["level"].max()), 1e-9)
-        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0)
+        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0, False)
         assert_evaluated(search)
         assert search.routes.total[SATISFACTION] <= search.most
         drop_useless(search)

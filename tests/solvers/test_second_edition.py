@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from referee import Illegal, replay
+from referee_legs import Legs
 from worlds import random_sorties, random_world
 
 from app.domain.plan import Plan
@@ -24,11 +25,11 @@ from app.solvers.protocol import SolverContext
 from app.solvers.stop import Deadline
 
 REL = 1e-9
-PROBLEMS = 60
+PROBLEMS = 30
 MOST_PLANS = 400
 
 
-def best_plan(body: dict[str, Any]) -> float | None:
+def best_plan(body: dict[str, Any], legs: Legs) -> float | None:
     """The best reward of all plans by the referee; None where they are too many."""
     m, n, lengths = len(body["uavs"]), len(body["targets"]), range(1, body["max_steps"] + 1)
     stops = [*range(n), *range(n + 1, n + 1 + len(body.get("bases") or ()))]
@@ -46,7 +47,7 @@ def best_plan(body: dict[str, Any]) -> float | None:
         own = []
         for route in routes:
             try:
-                replay(body, rows([route if h == i else () for h in range(m)]))
+                replay(body, rows([route if h == i else () for h in range(m)]), legs=legs)
             except Illegal as broken:
                 if broken.args[2] != "useless":
                     continue
@@ -60,7 +61,7 @@ def best_plan(body: dict[str, Any]) -> float | None:
     best = -float("inf")
     for chosen in itertools.product(*possible):
         try:
-            best = max(best, replay(body, rows(chosen))["reward"])
+            best = max(best, replay(body, rows(chosen), legs=legs)["reward"])
         except Illegal:
             continue
     return best
@@ -80,11 +81,12 @@ def test_plans_are_legal_rewards_true_and_bounds_valid(draw, part):
         rng = np.random.default_rng(number)
         problem = draw(rng, max_uavs=3, max_targets=3)
         body = problem_to_record(problem)
-        rewards = {"greedy": earned(body, problem, greedy_plan(problem))}
+        legs = Legs(body)
+        rewards = {"greedy": earned(body, legs, problem, greedy_plan(problem))}
         for name, solver in solvers.items():
             solution = solver.solve(problem, 1, Deadline(2.0), lambda _: None)
-            rewards[name] = earned(body, problem, solution.plan)
-        best, most = best_plan(body), max(rewards.values())
+            rewards[name] = earned(body, legs, problem, solution.plan)
+        best, most = best_plan(body, legs), max(rewards.values())
         slack = 1e-7 * max(1.0, abs(most))
         assert solution.proof.bound >= most - slack, number
         for known in (None, rewards["local_search"]):
@@ -96,8 +98,8 @@ def test_plans_are_legal_rewards_true_and_bounds_valid(draw, part):
     assert proven > 0.9 * PROBLEMS
 
 
-def earned(body: dict[str, Any], problem: Problem, plan: Plan) -> float:
+def earned(body: dict[str, Any], legs: Legs, problem: Problem, plan: Plan) -> float:
     """The reward of a plan, which the referee confirms."""
     reward = reward_of(problem, plan)
-    assert reward == pytest.approx(replay(body, plan.assignment)["reward"], rel=REL, abs=REL)
+    assert reward == pytest.approx(replay(body, plan.assignment, legs=legs)["reward"], rel=REL, abs=REL)
     return reward

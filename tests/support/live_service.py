@@ -19,6 +19,15 @@ ROOT = Path(__file__).parents[2]
 SMALL = {"max_uavs": 50, "max_targets": 100}
 """Limits with which workers start sooner: they try how long the largest problem takes."""
 
+
+def variables(**settings: object) -> dict[str, str]:
+    """Return the variables of the environment that set settings, by their names in lower case."""
+    return {f"ALLOCATOR_{name.upper()}": str(value) for name, value in settings.items()}
+
+
+ONE_WORKER = variables(workers=1, **SMALL)
+"""Of a service that starts soon."""
+
 _READY_WITHIN_S = 300.0
 _ENDS_WITHIN_S = 60.0
 _SAMPLE = re.compile(r"^(\w+)(\{.*\})? (\S+)$", re.MULTILINE)
@@ -41,8 +50,7 @@ class LiveService:
         self.url = f"http://127.0.0.1:{self.port}"
         self.database = folder / "allocator.sqlite3"
         self.log = folder / "service.log"
-        given = {f"ALLOCATOR_{name.upper()}": str(value) for name, value in settings.items()}
-        self._environment = {**os.environ, "ALLOCATOR_DATA_DIR": str(folder), **given}
+        self._environment = {**os.environ, **variables(data_dir=folder, **settings)}
         self._process: subprocess.Popen[bytes] | None = None
 
     @property

@@ -72,7 +72,7 @@ def test_a_scene_of_some_metres_is_that_of_a_plane():
     assert found * 1000 == pytest.approx(2 * math.sqrt(5) + 4, rel=1e-5)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32), st.sampled_from([(85.0, 27.0), (179.5, -40.0), (0.0, 80.0)]))
 def test_lengths_are_a_metric(seed, place):
     places, zones = star_scene(np.random.default_rng(seed), places=12, zones=5, corners=7)

@@ -111,7 +111,7 @@ def test_a_wind_of_0_is_none(crs):
         assert np.array_equal(calm.flown(7.0).time, still.flown(7.0).time)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     st.integers(0, 2**32),
     st.sampled_from(["local", "wgs84"]),

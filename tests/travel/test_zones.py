@@ -47,7 +47,7 @@ ZONES = st.lists(zone(), min_size=1, max_size=3)
 PLACES = st.lists(st.tuples(*[st.integers(-2, 16).map(lambda n: n / 2)] * 2), min_size=2, max_size=3)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(ZONES, PLACES)
 def test_lengths_are_those_of_exact_arithmetic(zones, places):
     exact = ExactWays(zones)
@@ -55,7 +55,7 @@ def test_lengths_are_those_of_exact_arithmetic(zones, places):
     np.testing.assert_allclose(lengths(places, zones), expected, rtol=1e-9)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(ZONES, PLACES, st.floats(0, math.tau), st.floats(-9, 11), STEP, STEP)
 def test_what_touches_exactly_touches_after_rounding_too(zones, places, angle, exponent, x, y):
     scale, turned = (
@@ -71,7 +71,7 @@ def test_what_touches_exactly_touches_after_rounding_too(zones, places, angle, e
     np.testing.assert_allclose(found / scale, expected, rtol=1e-7, atol=1e-7)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32))
 def test_lengths_are_a_metric_and_ways_stay_outside(seed):
     places, zones = star_scene(np.random.default_rng(seed), places=12, zones=5, corners=7)

@@ -18,7 +18,7 @@ def make(seed, m, batch=3):
     return mixer, values, hidden, present
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(st.integers(0, 10_000), st.integers(1, 7), st.data())
 def test_raising_a_value_never_lowers_the_joint_one(seed, m, data):
     mixer, values, hidden, present = make(seed, m)
@@ -33,7 +33,7 @@ def test_raising_a_value_never_lowers_the_joint_one(seed, m, data):
     assert torch.allclose(after[~present_now], before[~present_now])
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(st.integers(0, 10_000), st.integers(2, 7))
 def test_numbering_of_agents_does_not_matter(seed, m):
     mixer, values, hidden, present = make(seed, m)
@@ -44,7 +44,7 @@ def test_numbering_of_agents_does_not_matter(seed, m):
     assert torch.allclose(found, expected, atol=1e-5)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(2, 5))
 def test_a_swarm_of_copies_is_worth_no_more(seed, m, copies):
     mixer, values, hidden, _ = make(seed, m)

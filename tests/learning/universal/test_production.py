@@ -1,5 +1,7 @@
 """From nothing to the files of all policies, and again without doing anything twice."""
 
+from dataclasses import replace
+
 import torch
 
 from app.learning.checkpoints.checkpoint import decode
@@ -17,7 +19,7 @@ PARAMETERS = UniversalTrainingParameters(
     metric_problems=1,
     search=0.01,
 )
-SOME = {name: FAMILIES[name] for name in ("uniform", "single_base", "mid_mission")}
+SOME = {name: FAMILIES[name] for name in ("single_base", "mid_mission")}
 
 
 def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
@@ -29,7 +31,7 @@ def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
     first = [file.read_bytes() for file in files]
     changed = {path.name: path.stat().st_mtime_ns for path in work.iterdir()}
 
-    assert making.run(folder, "all") == files
+    assert replace(making, workers=1).run(folder, "all") == files
 
     assert [file.read_bytes() for file in files] == first
     assert {path.name: path.stat().st_mtime_ns for path in work.iterdir()} == changed

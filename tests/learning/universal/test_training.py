@@ -5,6 +5,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 import torch
+from numba import typeof
 from referee import replay
 
 from app.domain.records import problem_to_record
@@ -15,6 +16,7 @@ from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
 from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard
 from app.learning.universal.training.trainer import Schedule, fit
 from app.simulation import visit
+from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.simulation.replay import replay as replayed
 from app.solvers.greedy import greedy_plan
@@ -108,6 +110,10 @@ def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
     one, two = (read_shard(write_shard(folder, SERIES, 7, 1)) for folder in (first, second))
     assert np.array_equal(one.plans, two.plans)
     assert all(np.array_equal(a, b) for a, b in zip(one.arrays, two.arrays, strict=True))
+    # Of another type, all that is compiled would be compiled again.
+    assert typeof(one.arrays) == typeof(
+        compile_problem(generate("uniform", 2, 4, 2, np.random.default_rng(0)))
+    )
     other = read_shard(write_shard(first, SERIES, 7, 2))
     assert not np.array_equal(one.arrays.load, other.arrays.load)
     path = write_shard(first, SERIES, 7, 1)

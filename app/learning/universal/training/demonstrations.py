@@ -16,12 +16,8 @@ from app.learning.universal.episodes.rollout import play_in_orders
 from app.learning.universal.episodes.turn_order import some_orders
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.training.curriculum import Shard, draw_shard
-from app.simulation.arrays import (
-    Floats,
-    Integers,
-    ProblemArrays,
-    compile_problem,
-)
+from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
+from app.simulation.columns import AREAS, BASES, TERMS, UAVS
 from app.simulation.generator import FAMILIES
 from app.simulation.stacks import stack
 from app.solvers.greedy import greedy_plan
@@ -95,7 +91,8 @@ def demonstrate(
         set_routes(search, start)
         scale = largest_level(arrays)
         stream = np.random.Generator(np.random.SFC64(rng.integers(2**63)))
-        anneal(search, stream, shard.moves, heat * scale, 0.001 * scale, 0.01 * scale)
+        # All arguments: with one left out it would be compiled again.
+        anneal(search, stream, shard.moves, heat * scale, 0.001 * scale, 0.01 * scale, 0.0, 0.0, False)
         if search.best[0] <= 1e-3 * scale:
             continue
         plan = np.full((steps, shard.n_uavs), shard.n_targets, np.int64)
@@ -154,4 +151,11 @@ def read_shard(path: Path) -> Demonstrations:
     """Read what :func:`write_shard` wrote."""
     with np.load(path) as file:
         arrays = ProblemArrays(**{name: file[name] for name in ProblemArrays._fields})
+        # A file does not say that its records are aligned; for others everything would be compiled again.
+        arrays = arrays._replace(
+            uavs=arrays.uavs.view(UAVS),
+            areas=arrays.areas.view(AREAS),
+            bases=arrays.bases.view(BASES),
+            terms=arrays.terms.view(TERMS),
+        )
         return Demonstrations(arrays, file["plans"], file["rewards"])
