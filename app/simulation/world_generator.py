@@ -132,7 +132,8 @@ def stock(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generato
     bases = tuple(
         Base(
             f"base-{number + 1}",
-            *map(float, rng.random(2)),
+            float(rng.random()),
+            float(rng.random()),
             stock=tuple(np.round(needed * rng.uniform(0.1, 0.3, n_materials)).tolist()),
             turnaround=float(rng.uniform(0.05, 0.25)),
         )

@@ -18,7 +18,6 @@ from app.simulation.arrays import (
     compile_problem,
 )
 from app.simulation.simulator import allowed_actions, new_episodes, reset
-from app.simulation.stacks import without_reloads
 
 
 class Environment(Protocol):
@@ -79,7 +78,7 @@ class SwarmEnvironment:
     def __init__(self, problem: Problem) -> None:
         self.sizes = swarm_sizes(problem)
         self.max_steps = problem.max_steps
-        self._arrays = without_reloads(compile_problem(problem))
+        self._arrays = compile_problem(problem)
         self._features = features_of(problem)
         self._episodes = new_episodes(self._arrays, 1)
         self._reward = np.zeros(1)

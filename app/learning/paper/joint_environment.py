@@ -26,7 +26,6 @@ from app.simulation.simulator import (
     reset,
     verdict,
 )
-from app.simulation.stacks import without_reloads
 from app.simulation.visit import ALLOWED
 
 MAX_JOINT_ACTIONS = 20_000
@@ -155,7 +154,7 @@ class JointEnvironment:
         self.sizes = NetworkSizes(1, count_joint_actions(problem), swarm_sizes(problem).state_features, 0)
         self.max_steps = problem.max_steps
         self._base = problem.n_targets + 1
-        self._arrays = without_reloads(compile_problem(problem))
+        self._arrays = compile_problem(problem)
         self._features = features_of(problem)
         self._episodes = new_episodes(self._arrays, 1)
         self._scratch = new_episodes(self._arrays, problem.n_uavs)
