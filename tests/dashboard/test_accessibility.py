@@ -76,6 +76,21 @@ def test_no_refusal_and_no_message_breaks_a_rule(audited):
     expect(page.locator("#alerts .notice")).to_have_count(0)
 
 
+def test_no_zone_breaks_a_rule(audited):
+    page = audited
+    page.evaluate(
+        "async () => (await import('/dashboard/js/problem.js'))"
+        ".addZone([[34.5, -19.5], [34.9, -19.5], [34.5, -19.9], [34.9, -19.9]])"
+    )
+    expect(page.locator("#zone-fault")).to_contain_text("crosses")
+    selected = violations(page)
+    page.click("[data-draw=zone]")
+    page.keyboard.press("Space")
+    expect(page.locator("#drawing-says")).to_have_text("1 corner.")
+
+    assert (selected, violations(page)) == ([], [])
+
+
 def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
     ready(page)
     page.locator("#key").press("Enter")

@@ -17,7 +17,7 @@ PROBLEM = {
     "materials": [{"name": "water", "weight": 1.5}, {"name": "=food"}],
     "no_fly_zones": [
         {"id": "airport", "polygon": SQUARE, "name": "Airport", "properties": {"k": [1]}},
-        {"polygon": SQUARE[:3]},
+        {"id": "zone-2", "polygon": SQUARE[:3]},
     ],
     "wind": {"speed": 2, "towards": 90},
     "start_plan": [[0, 2], [1, 2]],
@@ -146,7 +146,7 @@ def test_zones_are_polygons_of_a_map(openapi):
     ]
     files = [json.dumps({"type": "FeatureCollection", "features": [each]}) for each in given]
     taken, *refused = run(openapi, "return given.files.map(read);", files=files)
-    assert taken["problem"]["no_fly_zones"] == [{"name": "Airport", "polygon": SQUARE}]
+    assert taken["problem"]["no_fly_zones"] == [{"id": "zone-1", "name": "Airport", "polygon": SQUARE}]
     assert [each["refused"] for each in refused] == [
         "feature 1 has 1 holes: a zone has none",
         "feature 1 is a MultiPolygon: a zone is one Polygon",

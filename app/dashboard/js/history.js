@@ -38,6 +38,6 @@ export function redo() {
 
 function goTo(step, past, future) {
   const { selection } = get();
-  const there = selection && step.problem[selection.kind].some(({ id }) => id === selection.id);
+  const there = selection && step.problem[selection.kind]?.some(({ id }) => id === selection.id);
   set({ ...step, past, future, incumbent: null, violations: [], selection: there ? selection : null });
 }

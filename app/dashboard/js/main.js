@@ -123,7 +123,8 @@ function onKeys(event) {
   const command = event.ctrlKey || event.metaKey;
   if (command && event.key.toLowerCase() === "z" && !typing) {
     event.preventDefault();
-    (event.shiftKey ? redo : undo)();
+    if (map.drawing && !event.shiftKey) map.drawing.takeBack();
+    else (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
     set({ view: "allocate" });
     allocateNow();

@@ -7,6 +7,7 @@ import { wayTo } from "../faults.js";
 import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
 import { get, set, subscribe } from "../state.js";
+import { crossingNotes } from "../zone_form.js";
 
 /** The field that asks to keep what is learned: only some algorithms learn. */
 const KEEPING = "keep_checkpoint";
@@ -43,7 +44,7 @@ function makeForm() {
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
   const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
     labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element,
-    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place),
+    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place), crossingNotes(),
     h("div", { class: "row" }, start, stop), elsewhere);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
