@@ -91,6 +91,25 @@ def test_no_zone_breaks_a_rule(audited):
     assert (selected, violations(page)) == ([], [])
 
 
+def test_no_plan_that_is_locked_or_changed_breaks_a_rule(audited, service):
+    page = audited
+    show_answer(page, service.url, algorithm="greedy")
+    go(page, "answer")
+    page.locator(".lock").nth(1).click()
+    faults = [violations(page)]
+    page.get_by_role("button", name="Change this plan").click()
+    page.locator("#draft-routes button[data-act=Later]:not(:disabled)").first.click()
+    expect(page.locator("#breaches li")).to_have_count(1)
+    page.locator("#draft-routes button[data-act=Move]").first.click()
+    faults.append(violations(page))
+    page.get_by_role("button", name="Leave the plan as it was").click()
+    page.get_by_role("button", name="Begin the next allocation with it").click()
+    expect(page.locator("#begins-with li")).to_have_count(2)
+    faults.append(violations(page))
+
+    assert faults == [[], [], []]
+
+
 def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
     ready(page)
     page.locator("#key").press("Enter")

@@ -5,6 +5,7 @@ import { resume, running } from "./allocation.js";
 import { hasKey, json, onKeyNeeded, send, useKey } from "./api.js";
 import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
+import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
 import { keepMission, restore } from "./keep.js";
 import { DispatchMap } from "./map.js";
@@ -202,6 +203,7 @@ async function start() {
   document.addEventListener("keydown", onKeys);
   subscribe(["problem", "problemName"], titleProblem);
   keepColours();
+  judgeDrafts();
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();

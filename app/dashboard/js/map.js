@@ -184,9 +184,9 @@ export class DispatchMap {
     clearTimeout(this.later);
     this.later = null;
     const began = performance.now();
-    if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
-      this.routes.draw(planned, plan, (point) => this.#latLng(point));
-      this.drawn = { plan, planned, shift: this.shift, routes: this.routes };
+    if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.uavs !== problem.uavs || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
+      this.routes.draw(planned, plan, problem, (point) => this.#latLng(point));
+      this.drawn = { plan, planned, uavs: problem.uavs, shift: this.shift, routes: this.routes };
     }
     this.air.draw(problem, (point) => this.#latLng(point), this.shift);
     const answer = plan && !Array.isArray(plan) && planned === problem ? plan : null;

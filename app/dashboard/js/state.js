@@ -19,6 +19,7 @@ let state = Object.freeze({
   job: null,
   answer: null,
   answerProblem: null,
+  draft: null,
   mission: BEGINNING,
   incumbent: null,
   violations: [],

@@ -1,6 +1,7 @@
 /** Allocate: algorithm, parameters and limits as the service describes them; the reward climbing live. */
 
 import { allocate, cancel, running } from "../allocation.js";
+import { beginningNotes } from "../beginning.js";
 import { drawCurves } from "../curve.js";
 import { h, number, shown } from "../dom.js";
 import { wayTo } from "../faults.js";
@@ -44,7 +45,7 @@ function makeForm() {
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
   const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
     labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element,
-    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place), crossingNotes(),
+    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place), beginningNotes(), crossingNotes(),
     h("div", { class: "row" }, start, stop), elsewhere);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
