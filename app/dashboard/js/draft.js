@@ -43,6 +43,13 @@ export function withMoved(visits, from, to) {
   return withVisit(withoutVisit(visits, from), to, visits[from.uav][from.at]);
 }
 
+/** A plan without the visits that break a rule; the same where none of them is one. @param {object[]} breaches as `POST /evaluate` has them */
+export function withoutBroken(problem, visits, breaches) {
+  const broken = new Set(breaches.map(({ uav_id: id, step }) => `${problem.uavs.findIndex((uav) => uav.id === id)} ${step - 1}`));
+  const left = visits.map((list, i) => list.filter((_, at) => !broken.has(`${i} ${at}`)));
+  return left.every((list, i) => list.length === visits[i].length) ? visits : left;
+}
+
 /** A rule that an action breaks, in words with its figures. @param {object} breach as `POST /evaluate` has it */
 export function saidOfBreach(breach, problem) {
   const uav = problem.uavs.find(({ id }) => id === breach.uav_id);

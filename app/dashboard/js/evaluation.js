@@ -2,7 +2,8 @@
 
 import { ApiError, json } from "./api.js";
 
-const ILLEGAL = 422;
+/** The type of the refusal of a plan; any other is of the problem, or of the service. */
+const ILLEGAL = "illegal-plan";
 
 /**
  * Evaluate a plan.
@@ -16,7 +17,7 @@ export async function evaluate(problem, assignment, { at, signal } = {}) {
   try {
     return { answer: await json("evaluate", { method: "POST", body: { ...problem, assignment, at }, signal }) };
   } catch (error) {
-    if (!(error instanceof ApiError) || error.status !== ILLEGAL) throw error;
+    if (!(error instanceof ApiError) || error.problem.type !== ILLEGAL) throw error;
     return { refusal: { detail: error.message, breaches: error.problem.breaches ?? [] } };
   }
 }
