@@ -79,6 +79,9 @@ def test_an_allocation_keeps_what_is_locked_though_it_costs_a_detour(page, servi
     page.get_by_role("button", name="Keep this plan").click()
     lock(page, 3).press("Enter")
     assert committed(page) == DETOUR[:3]
+    page.get_by_role("button", name="Change this plan").click()
+    expect(page.locator("#draft-routes .chip", has_text="locked")).to_have_count(3)
+    page.get_by_role("button", name="Leave the plan as it was").click()
     go(page, "allocate")
     page.select_option("select[name=algorithm]", "local_search")
     page.fill("input[name=time_limit_s]", "0.3")

@@ -114,6 +114,11 @@ def test_every_broken_rule_is_said_with_its_figures_and_undone(changing):
     move(page, "u", 0, "v", 3)
     judged(page, "refused")
     expect(page.locator("#breaches li")).to_have_count(2)
+    page.get_by_role("button", name="Take them out").click()
+    judged(page, "legal")
+    assert visits(page) == [[], ["c"]]
+    page.locator("body").press("Control+z")
+    judged(page, "refused")
     page.locator("body").press("Control+z")
     page.locator("body").press("Control+z")
     judged(page, "legal")

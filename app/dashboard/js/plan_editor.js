@@ -1,9 +1,10 @@
 /** The routes of a plan while they are changed by hand: visits moved, added and removed, by buttons or by dragging. */
 
 import { paint } from "./colours.js";
-import { h, number, shown } from "./dom.js";
-import { saidOfBreach, withMoved, withVisit, withoutVisit } from "./draft.js";
+import { h, notify, number, shown } from "./dom.js";
+import { saidOfBreach, withMoved, withVisit, withoutBroken, withoutVisit } from "./draft.js";
 import { beginWith, changeDraft, dropDraft, judgeAgain, keepDraft } from "./drafting.js";
+import { lockedCount } from "./locks.js";
 import { called, names } from "./plan.js";
 import { Portions } from "./portions.js";
 import { get, select, set } from "./state.js";
@@ -22,8 +23,16 @@ export function judgement(problem, answer, draft) {
   return h("section", { class: "card block", id: "draft", "data-judged": legal ? "legal" : refusal ? "refused" : trouble ? "trouble" : "asking" },
     h("h2", {}, "Your change of the plan"), h("div", { role: "status", id: "draft-says" }, says),
     refusal && h("ul", { class: "violations", id: "breaches" }, refusal.breaches.map((breach) => h("li", { class: "error", dataset: { rule: breach.rule } }, saidOfBreach(breach, problem)))),
+    refusal?.breaches.length > 0 && h("div", {}, h("button", { type: "button", onclick: () => takeOut(problem, draft) }, refusal.breaches.length === 1 ? "Take it out" : "Take them out")),
     h("div", { class: "row" }, button("Keep this plan", keepDraft, legal),
       button("Begin the next allocation with it", () => { beginWith(draft.visits); set({ view: "allocate" }); }, legal), button("Leave the plan as it was", dropDraft)));
+}
+
+/** Go on without the visits that break a rule. */
+function takeOut(problem, { visits, refusal }) {
+  const left = withoutBroken(problem, visits, refusal.breaches);
+  if (left === visits) notify("No visit would have to go: the plan as a whole breaks a rule", "error");
+  else changeDraft(left);
 }
 
 /** The visits of every UAV, with what moves them. */
@@ -82,7 +91,7 @@ export class PlanEditor {
     const act = (sign, what, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": `${what}: ${name}, visit ${at + 1} of ${called(uav)}`, title: what, dataset: { act: what }, disabled: !possible, onclick: does }, sign);
     const to = (place, what) => this.#change(withMoved(this.visits, { uav: i, at }, { uav: i, at: place }), { uav: i, at: place, act: what });
     return h("tr", { draggable: "true", dataset: { uavId: uav.id, uav: i, at, targetId: id } },
-      h("td", { class: "n" }, String(at + 1)), h("td", { title: id }, name), h("td", { class: "num" }, "–"),
+      h("td", { class: "n" }, String(at + 1)), h("td", { title: id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, "locked")]), h("td", { class: "num" }, "–"),
       h("td", { class: "acts" },
         act("↑", "Earlier", () => to(at - 1, "Earlier"), at > 0), act("↓", "Later", () => to(at + 1, "Later"), at < this.visits[i].length - 1),
         act("Move…", "Move", ({ target }) => this.#ask(target, { uav: i, at }, id)),

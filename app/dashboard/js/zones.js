@@ -24,7 +24,8 @@ export function crossings(crs, corners, closed = true) {
 export function saidOfCrossings(pairs, count) {
   if (!pairs.length) return "";
   const [one, other] = pairs[0].map((side) => `corner ${side + 1} to ${((side + 1) % count) + 1}`);
-  const more = pairs.length > 1 ? `, and ${pairs.length - 1} more pairs cross` : "";
+  const others = pairs.length - 1;
+  const more = others ? `, and ${others} more ${others === 1 ? "pair crosses" : "pairs cross"}` : "";
   return `The side from ${one} crosses that from ${other}${more}.`;
 }
 
