@@ -141,10 +141,15 @@ def test_what_a_uav_is_doing_by_the_answers_own_times():
             given.clocks.map((clock) => Object.values(doingAt(uav, times[0], clock))),
             given.clocks.map((clock) => homeward(times[0], clock)),
             course(given.problem, times),
+            [[1, 5], [0, 5], [1, 15]].map(([dis, clock]) => {
+                const stops = [{ id: "a", left: 5, arrival: 8, begin: 8, done: 8 }];
+                const none = { stops: [], home: 10 };
+                return [{ stops, home: 10 }, none].map((each) => doingAt({ ...uav, dis }, each, clock).doing);
+            }),
         ];
     """
     clocks = [3.0, 5.25, 9.25, 11.0, 12.0, 16.0, 20.0]
-    doing, homeward, course = run_module(code, {"problem": STILL, "answer": ANSWER, "clocks": clocks})
+    doing, homeward, course, aloft = run_module(code, {"problem": STILL, "answer": ANSWER, "clocks": clocks})
     assert doing == [
         ["waiting", "a"],
         ["flying", "a"],
@@ -156,6 +161,8 @@ def test_what_a_uav_is_doing_by_the_answers_own_times():
     ]
     assert homeward == [False] * 5 + [True] * 2
     assert course == {"begin": 1, "end": 20, "moments": [1, 9, 9.5, 10, 12, 20]}
+    # In the air when its plan begins, or on the ground; with a visit to make, or with none.
+    assert aloft == [["flying", "returning"], ["waiting", "idle"], ["home", "home"]]
 
 
 def test_the_clock_goes_on_and_so_do_all_times(page, service):

@@ -1,6 +1,6 @@
 /** When the UAVs of a plan do what, by the answer's own times. */
 
-import { waiting } from "./plan.js";
+import { stateOf, waiting } from "./plan.js";
 
 /** When a UAV leaves for each stop, arrives, begins and is done there, when it waits, and when it is home. */
 export function timesOf(uav, route, targets) {
@@ -48,11 +48,13 @@ export function homeward({ stops }, clock) {
  * @returns {{doing: "idle" | "waiting" | "flying" | "unloading" | "returning" | "home", next: string | null}} `next` is the area
  */
 export function doingAt(uav, { stops, home }, clock) {
-  for (const { id, left, begin, arrival, done } of stops) {
-    if (clock < arrival) return { doing: clock > left ? "flying" : "waiting", next: id };
+  const aloft = stateOf(uav) !== "at its base";
+  for (const [n, { id, left, begin, arrival, done }] of stops.entries()) {
+    // At the very moment it leaves it flies only where it was in the air before.
+    if (clock < arrival) return { doing: clock > left || (clock === left && (aloft || n > 0)) ? "flying" : "waiting", next: id };
     if (clock < begin) return { doing: "waiting", next: id };
     if (clock < done) return { doing: "unloading", next: id };
   }
-  if (!stops.length && !(uav.ret && clock < home)) return { doing: "idle", next: null };
+  if (!stops.length && !aloft) return { doing: "idle", next: null };
   return { doing: clock < home ? "returning" : "home", next: null };
 }
