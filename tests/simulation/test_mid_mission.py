@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 from problems import random_plan
-from worlds import random_world
+from worlds import random_sorties, random_world
 
+from app.domain.allocation import Reload
 from app.domain.plan import Plan
 from app.simulation.breaches import breaches_of
 from app.simulation.explain import timed_routes
 from app.simulation.mid_mission import remaining_at
 
 
-def moments(count):
+def moments(count, draw=random_world):
     """Random problems with a plan, its routes, and a moment of it."""
     rng = np.random.default_rng(3)
     while count:
-        problem = random_world(rng)
+        problem = draw(rng)
         plan = random_plan(problem, rng)
         routes = timed_routes(problem, plan)
         ends = [route.landing.time for route in routes if route.landing]
@@ -77,3 +78,55 @@ def test_a_uav_between_two_places_is_committed_to_where_it_flies():
                 assert now.committed[0] == ahead[0].target_id
                 under_way += 1
     assert under_way > 10
+
+
+def begun_by(route, at):
+    """The stops of a route that have begun at a moment: visits unload then, reloads are there."""
+    return [
+        stop
+        for stop in route.stops
+        if (stop.arrival_time if isinstance(stop, Reload) else stop.begin_time) <= at
+    ]
+
+
+def test_with_bases_loads_and_stocks_are_what_has_been_taken_and_brought():
+    reloads = 0
+    for problem, routes, left, at in moments(200, random_sorties):
+        taken = {base.id: np.zeros(problem.n_materials) for base in problem.bases}
+        for before, now, route in zip(problem.uavs, left.uavs, routes, strict=True):
+            load = np.array(before.loadlist)
+            for stop in [] if before.ret else begun_by(route, at):
+                if isinstance(stop, Reload):
+                    load = load + stop.loaded
+                    taken[stop.base_id] += stop.loaded
+                    reloads += 1
+                else:
+                    load = load - stop.delivered
+            np.testing.assert_allclose(now.loadlist, load, atol=1e-6)
+            assert now.full == before.full
+        for before, now in zip(problem.bases, left.bases, strict=True):
+            assert (before.stock is None) == (now.stock is None)
+            if before.stock is not None:
+                np.testing.assert_allclose(now.stock, np.array(before.stock) - taken[before.id], atol=1e-6)
+    assert reloads > 50
+
+
+def test_with_bases_the_rest_of_the_plan_is_legal_and_as_it_was():
+    later = same = 0
+    for problem, routes, left, at in moments(250, random_sorties):
+        rest = Plan(left.start_plan)
+        assert not breaches_of(left, rest)
+        loose = 1e-2 if problem.wind and problem.crs == "wgs84" else 1e-6
+        for route, now in zip(routes, timed_routes(left, rest), strict=True):
+            ahead = route.stops[len(begun_by(route, at)) :]
+            kept = [stop for stop in ahead if not isinstance(stop, Reload)]
+            # Steps count anew, and who has reloaded is not known to wait on the ground: a stop may be left out.
+            if len(ahead) != len(now.stops):
+                continue
+            same += 1
+            for stop, planned in zip(now.visits, kept, strict=True):
+                assert stop.target_id == planned.target_id
+                assert stop.begin_time == pytest.approx(planned.begin_time, rel=loose, abs=loose)
+                later += 1
+    assert later > 100
+    assert same > 500
