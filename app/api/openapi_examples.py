@@ -88,6 +88,10 @@ ALLOCATION_EXAMPLES: dict[str, Example] = {
         summary="No-fly zones, wind and opening hours: towns of southern Malawi after Cyclone Freddy",
         value={**example_problem("cyclone-freddy"), "algorithm": "auto", "time_limit_s": 2},
     ),
+    "rwanda-floods": Example(
+        summary="A base with stock and turnaround, several flights a UAV: hospitals after floods in Rwanda",
+        value={**example_problem("rwanda-floods"), "algorithm": "auto", "time_limit_s": 2},
+    ),
     "planned-unloading": Example(
         summary="How much a visit unloads is decided with the plan; with a bound on what any plan earns",
         value={

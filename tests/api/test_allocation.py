@@ -32,6 +32,8 @@ def agrees_with_referee(problem, answer):
     for route in answer["routes"]:
         assert route["distance"] == pytest.approx(sum(stop["distance"] for stop in route["stops"]))
         for stop in route["stops"]:
+            if stop.get("kind") == "reload":
+                continue
             for k, amount in enumerate(stop["delivered"]):
                 delivered[stop["target_id"]][k] += amount
     for j, target in enumerate(problem["targets"], 1):

@@ -1,10 +1,11 @@
-"""The bundled examples: problems without oddities, and one that shows what zones and wind do."""
+"""The bundled examples: no oddities; what zones and wind do, and what a base does."""
 
 import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from referee import replay
 from shapely import LineString, Polygon
@@ -40,6 +41,12 @@ def allocated(problem):
     return tasks.allocate(payload, context).result
 
 
+def rewards_told(heading):
+    """The rewards in the table of a section of the page."""
+    _, after = (FOLDER / "README.md").read_text("utf-8").split(f"\n## {heading}\n")
+    return re.findall(r"^\| [a-zA-Z_` ]+ \| ([\d.]+) \|", after.split("\n## ")[0], re.MULTILINE)
+
+
 @pytest.fixture(scope="module")
 def freddy():
     """The example with zones and wind, and a plan of it."""
@@ -57,6 +64,27 @@ def without_wind(freddy):
 def without_zones(freddy):
     """A plan of the same where everything may be flown through."""
     return allocated(replace(freddy[0], no_fly_zones=()))
+
+
+@pytest.fixture(scope="module")
+def floods():
+    """The example with a base, and a plan of it."""
+    problem = problem_of("rwanda-floods")
+    return problem, allocated(problem)
+
+
+@pytest.fixture(scope="module")
+def floods_otherwise(floods):
+    """Other problems with a base, or without, in the order of the page, and a plan of each."""
+    problem, _ = floods
+    (base,) = problem.bases
+    others = [
+        replace(problem, bases=()),
+        replace(problem, uavs=(*problem.uavs, replace(problem.uavs[0], id="wing-7"))),
+        replace(problem, bases=(replace(base, turnaround=2 * base.turnaround),)),
+        replace(problem, bases=(replace(base, stock=None),)),
+    ]
+    return [(other, allocated(other)) for other in others]
 
 
 @pytest.mark.parametrize("name", example_names())
@@ -103,11 +131,8 @@ def test_the_plan_is_what_the_referee_computes(freddy, without_wind, without_zon
 
 
 def test_the_page_tells_rewards_that_are_found(freddy, without_wind, without_zones):
-    told = re.findall(
-        r"^\| [a-z_` ]+ \| ([\d.]+) \|", (FOLDER / "README.md").read_text("utf-8"), re.MULTILINE
-    )
     found = [answer["reward"] for answer in (freddy[1], without_wind, without_zones)]
-    assert [f"{reward:.3f}" for reward in found] == told
+    assert [f"{reward:.3f}" for reward in found] == rewards_told("What zones and wind do")
     assert found[0] < min(found[1:])
     assert [each["target_id"] for each in without_wind["unmet"]] == ["zomba"]
 
@@ -159,3 +184,59 @@ def test_the_wind_takes_what_still_air_allows(freddy):
     assert (breach.rule, breach.uav_id, breach.target_id) == ("range", "short-1", "thyolo")
     assert breach.needed > breach.had == pytest.approx(0.9 * 120)
     assert breaches_of(still, plan) == []
+
+
+def test_figures_are_those_of_the_sources():
+    """Levels in the order of the deaths by district; a full box is what a UAV carries; units of blood."""
+    deaths = {"Rubavu": 26, "Rutsiro": 27, "Karongi": 16, "Ngororero": 23, "Nyabihu": 18} | {
+        "Musanze": 5, "Gakenke": 2, "Nyamagabe": 2, "Burera": 8, "Gicumbi": 3
+    }  # fmt: skip
+    problem = problem_of("rwanda-floods")
+    (base,) = problem.bases
+    for target in problem.targets:
+        dead = deaths.get(target.properties["district"], 0)
+        assert target.level == (1 if dead >= 16 else 0.6 if dead else 0.3)
+    assert deaths.keys() <= {target.properties["district"] for target in problem.targets}
+    for uav in problem.uavs:
+        weight = sum(amount * of.weight for amount, of in zip(uav.loadlist, problem.materials, strict=True))
+        assert weight == uav.capacity == 1.75
+        assert (uav.x_s, uav.y_s) == (base.x, base.y)
+    assert base.stock[0] + sum(uav.loadlist[0] for uav in problem.uavs) == 35
+
+
+def test_plans_with_a_base_are_what_the_referee_computes(floods, floods_otherwise):
+    for problem, answer in [floods, *floods_otherwise]:
+        replayed = replay(problem_to_record(problem), answer["assignment"])
+        assert answer["reward"] == pytest.approx(replayed["reward"])
+
+
+def test_the_page_tells_rewards_with_a_base_that_are_found(floods, floods_otherwise):
+    found = [answer["reward"] for _, answer in [floods, *floods_otherwise]]
+    assert [f"{reward:.3f}" for reward in found] == rewards_told("What a base does")
+    as_it_is, without_bases, one_more, slower, all_in_stock = found
+    assert without_bases < slower < as_it_is < min(one_more, all_in_stock)
+
+
+def test_every_uav_flies_several_times_and_takes_what_is_in_stock(floods):
+    problem, answer = floods
+    (base,) = problem.bases
+    loaded = np.zeros(problem.n_materials)
+    flights = []
+    for route in answer["routes"]:
+        kinds = [stop["kind"] for stop in route["stops"]]
+        flights.append(sum(kind == "visit" and before != kind for before, kind in pairwise(["", *kinds])))
+        loaded += sum(np.array(stop["loaded"]) for stop in route["stops"] if stop["kind"] == "reload")
+        assert route["landing"]["time"] <= 3.5
+    assert set(flights) == {3, 4}
+    assert sum(flights) == 20
+    assert np.array(base.stock) - loaded == pytest.approx(answer["bases"][0]["stock"])
+
+
+def test_what_a_base_cannot_give_says_why(floods, floods_otherwise):
+    _, answer = floods
+    codes = {each["target_id"]: each["code"] for each in answer["unmet"]}
+    far = dict.fromkeys(["gisenyi", "murunda", "mugonero", "shyira", "kibogora"], "no_time_for_reload")
+    assert codes == far | {"kabaya": "stock", "butaro": "out_of_range"}
+    assert answer["bases"][0]["stock"][0] == 0
+    _, all_in_stock = floods_otherwise[-1]
+    assert [each["target_id"] for each in all_in_stock["unmet"]] == [id for id in codes if id != "kabaya"]
