@@ -258,9 +258,9 @@ class _Evaluator:
             worth_it = flight.gain > 0.0
             code = UnmetCode.NOT_CHOSEN if worth_it else UnmetCode.NOT_WORTH_IT
             return code, self._says.another_flight(flight.uav, flight.base, flight.gain), flight.uav
-        if flight.rules <= {TOO_LATE, HOME_TOO_LATE}:
-            return UnmetCode.NO_TIME_FOR_RELOAD, self._says.no_time_for_reload(), None
-        if NO_STEPS in flight.rules:
+        if flight.rules & {TOO_LATE, HOME_TOO_LATE}:
+            return UnmetCode.NO_TIME_FOR_RELOAD, self._says.no_time_for_reload(NO_STEPS in flight.rules), None
+        if flight.rules == {NO_STEPS}:
             return UnmetCode.STEP_LIMIT, self._says.no_steps_for_reload(), None
         return code, says, None
 

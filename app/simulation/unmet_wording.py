@@ -168,9 +168,10 @@ class Wording:
             return f"{flight} would cost {-gain:.6g} more than it earns"
         return f"{flight} would earn no more than it costs"
 
-    def no_time_for_reload(self) -> str:
-        """A base has it, but nobody is there and back in time."""
-        return "no UAV has the time to fetch it at a base after its other stops, and bring it"
+    def no_time_for_reload(self, some_have_no_steps: bool) -> str:
+        """A base has it, but nobody who has the steps is there and back in time."""
+        who = "no UAV with two steps left" if some_have_no_steps else "no UAV"
+        return f"{who} has the time to fetch it at a base after its other stops, and bring it"
 
     def no_steps_for_reload(self) -> str:
         """A base has it, but nobody has two steps left."""

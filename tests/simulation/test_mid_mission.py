@@ -120,7 +120,7 @@ def test_with_bases_the_rest_of_the_plan_is_legal_and_as_it_was():
         for route, now in zip(routes, timed_routes(left, rest), strict=True):
             ahead = route.stops[len(begun_by(route, at)) :]
             kept = [stop for stop in ahead if not isinstance(stop, Reload)]
-            # Steps count anew, and who has reloaded is not known to wait on the ground: stops may be left out.
+            # Steps count anew, and who has reloaded is not known to wait on the ground: some are left out.
             if len(ahead) != len(now.stops):
                 continue
             same += 1

@@ -139,11 +139,23 @@ def _apply_whole(arrays: ProblemArrays, routes: Routes, change: Change) -> None:
 @compiled
 def keep_best(search: Search) -> bool:
     """Make the current plan the incumbent if it is legal and better."""
+    return _keep(search, search.best[0] + ROUNDING * _turnover(search))
+
+
+@compiled
+def _turnover(search: Search) -> float:
+    """Sum of what the current plan earns and costs: its reward has a share of it as rounding error."""
+    total = search.routes.total
+    return total[SATISFACTION] + search.arrays.terms[0].weight * total[DISTANCE] + total[CLOSING]
+
+
+@compiled
+def _keep(search: Search, most: float) -> bool:
+    """Make the current plan the incumbent if it is legal and earns more than that."""
     routes = search.routes
     cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
     reward = routes.total[SATISFACTION] - cost
-    rounding = ROUNDING * (routes.total[SATISFACTION] + cost)
-    if routes.total[USELESS] > 0.5 or reward <= search.best[0] + rounding:
+    if routes.total[USELESS] > 0.5 or reward <= most:
         return False
     search.best[0] = reward
     for i in range(routes.length.shape[0]):
@@ -175,7 +187,6 @@ def drop_useless(search: Search) -> None:
                 while not _is_feasible_without(arrays, routes, change, i, s, gone):
                     gone = 2 if gone == 1 and _is_before_reload(search, i, s) else routes.length[i] - s
                 _apply_whole(arrays, routes, change)
-    _drop_last_reloads(search)
     keep_best(search)
 
 
@@ -196,24 +207,34 @@ def _is_feasible_without(
     return feasible(arrays, change)
 
 
+def drop_idle_reloads(search: Search) -> None:
+    """Take the reloads out of the incumbent without which it earns no less, and go on from there."""
+    if search.arrays.n_bases:
+        set_routes(search, actions_of(search))
+        _drop_idle_reloads(search)
+        _keep(search, search.best[0] - ROUNDING * _turnover(search))
+
+
 @compiled
-def _drop_last_reloads(search: Search) -> None:
-    """Take reloads off the ends of routes, unless the plan earns more with them."""
+def _drop_idle_reloads(search: Search) -> None:
+    """Take reloads out of the current plan without which it earns no less, the last ones of a route first."""
     arrays, routes, change = search.arrays, search.routes, search.change
     if arrays.stock.shape[1] == 0:
         return
     weight = arrays.terms[0].weight
     for i in range(routes.length.shape[0]):
-        length = routes.length[i]
-        if length == 0 or not is_reload(routes, search.near, i, length - 1):
-            continue
-        if not _is_feasible_without(arrays, routes, change, i, length - 1, 1):
-            continue
-        _apply_whole(arrays, routes, change)
-        cost, was = weight * routes.total[DISTANCE] + routes.total[CLOSING], change.total
-        less = was[SATISFACTION] - weight * was[DISTANCE] - was[CLOSING] - routes.total[SATISFACTION] + cost
-        if routes.total[USELESS] > was[USELESS] or less > ROUNDING * (was[SATISFACTION] + cost):
-            undo(arrays, routes, change)
+        for s in range(routes.length[i] - 1, -1, -1):
+            if not is_reload(routes, search.near, i, s):
+                continue
+            if not _is_feasible_without(arrays, routes, change, i, s, 1):
+                continue
+            _apply_whole(arrays, routes, change)
+            cost, was = weight * routes.total[DISTANCE] + routes.total[CLOSING], change.total
+            less = (
+                was[SATISFACTION] - weight * was[DISTANCE] - was[CLOSING] - routes.total[SATISFACTION] + cost
+            )
+            if routes.total[USELESS] > was[USELESS] or less > ROUNDING * (was[SATISFACTION] + cost):
+                undo(arrays, routes, change)
 
 
 @compiled_nogil

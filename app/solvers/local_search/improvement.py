@@ -16,7 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation.legs import UNREACHABLE
-from app.solvers.local_search.annealing import ROUNDING, Search, actions_of, anneal, drop_useless, set_routes
+from app.solvers.local_search.annealing import (
+    ROUNDING,
+    Search,
+    actions_of,
+    anneal,
+    drop_idle_reloads,
+    drop_useless,
+    set_routes,
+)
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import moves_a_second, rounds_for
 from app.solvers.protocol import StopCriterion
@@ -161,6 +169,7 @@ def improve_together(
                 _share_best(searches)
             number += 1
             watch(1.0 if combination.proven else number / rounds, number)
+    drop_idle_reloads(first)
 
 
 def _round(
