@@ -13,7 +13,7 @@ from worlds import random_world
 from app.domain.errors import InvalidCheckpoint, InvalidParameters, InvalidProblem
 from app.domain.matrices import Matrix
 from app.domain.records import problem_to_record
-from app.domain.surroundings import NoFlyZone
+from app.domain.surroundings import Base, NoFlyZone
 from app.domain.world_use import later_fields, used_fields, uses_world
 from app.learning.checkpoints.checkpoint import verify
 from app.learning.checkpoints.source_policies import SourcePolicies
@@ -51,6 +51,7 @@ def barred(problem):
         ),
     }
     return {
+        "bases": replace(problem, bases=(Base("base-1", 0.5, 0.5),)),
         "no_fly_zones": replace(problem, no_fly_zones=(ZONE,)),
         "matrices": replace(problem, matrices={"road": straight}, **located),
         "objective.half_life": replace(problem, objective=replace(problem.objective, half_life=1.0)),
@@ -137,8 +138,8 @@ def test_what_is_taken_is_flown_legally_and_earns_what_is_told():
         assert told >= replay(problem_to_record(problem), nothing)["reward"] - 1e-12
     taken = set(later_fields()) - unobserved().keys()
     of_matrices = {"uavs.location", "uavs.home_location", "uavs.profile", "targets.location"}
-    # A capacity bounds what planned loading takes aboard, and no flight.
-    assert used == taken - of_matrices - {"uavs.capacity"}
+    # A capacity bounds what planned loading takes aboard, and no flight; the others are nothing without bases.
+    assert used == taken - of_matrices - {"uavs.capacity", "uavs.full_load", "uavs.bases"}
 
 
 def test_a_used_field_is_told_at_its_first_place():

@@ -39,11 +39,15 @@ _TAKEN = frozenset(
         "uavs.home_location",
         "uavs.profile",
         "targets.location",
+        # Nothing without `bases`.
+        "uavs.full_load",
+        "uavs.bases",
     }
 )
 
 _NO_CLOCK = "the reward depends on the clock, which Eqs. 10 to 13 do not have"
 _REASONS = {
+    "bases": "there is no action for a reload, and positions do not tell at which base a UAV lands",
     "no_fly_zones": "the reward counts the way round a zone, which positions do not tell",
     "matrices": "the reward counts legs of a table, and the positions that are observed are for display",
     "objective.half_life": _NO_CLOCK,
