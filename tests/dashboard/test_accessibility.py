@@ -76,6 +76,40 @@ def test_no_refusal_and_no_message_breaks_a_rule(audited):
     expect(page.locator("#alerts .notice")).to_have_count(0)
 
 
+def test_no_zone_breaks_a_rule(audited):
+    page = audited
+    page.evaluate(
+        "async () => (await import('/dashboard/js/problem.js'))"
+        ".addZone([[34.5, -19.5], [34.9, -19.5], [34.5, -19.9], [34.9, -19.9]])"
+    )
+    expect(page.locator("#zone-fault")).to_contain_text("crosses")
+    selected = violations(page)
+    page.click("[data-draw=zone]")
+    page.keyboard.press("Space")
+    expect(page.locator("#drawing-says")).to_have_text("1 corner.")
+
+    assert (selected, violations(page)) == ([], [])
+
+
+def test_no_plan_that_is_locked_or_changed_breaks_a_rule(audited, service):
+    page = audited
+    show_answer(page, service.url, algorithm="greedy")
+    go(page, "answer")
+    page.locator(".lock").nth(1).click()
+    faults = [violations(page)]
+    page.get_by_role("button", name="Change this plan").click()
+    page.locator("#draft-routes button[data-act=Later]:not(:disabled)").first.click()
+    expect(page.locator("#breaches li")).to_have_count(1)
+    page.locator("#draft-routes button[data-act=Move]").first.click()
+    faults.append(violations(page))
+    page.get_by_role("button", name="Leave the plan as it was").click()
+    page.get_by_role("button", name="Begin the next allocation with it").click()
+    expect(page.locator("#begins-with li")).to_have_count(2)
+    faults.append(violations(page))
+
+    assert faults == [[], [], []]
+
+
 def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
     ready(page)
     page.locator("#key").press("Enter")

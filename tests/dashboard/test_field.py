@@ -1,11 +1,11 @@
-"""In the field: the state at a moment is worked out again here, and the new plan is replayed from it."""
+"""In the field: the state at a moment is worked out by hand, and the new plan is replayed from it."""
 
-import math
+import json
 
 import httpx
 import pytest
 from answers import but_for_reasons
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import go, open_problem, ready, show_answer, state, value
 from page_modules import run_module
 from playwright.sync_api import expect
 from referee import replay
@@ -44,6 +44,21 @@ def expected_state(problem, answer, time):
     return uavs, needs
 
 
+def moment(page, **mission):
+    """What the page makes of a moment of the plan on screen."""
+    return page.evaluate(
+        """async (patch) => {
+            const { get } = await import("/dashboard/js/state.js");
+            const { allTimes } = await import("/dashboard/js/times.js");
+            const { momentOf } = await import("/dashboard/js/mid_mission.js");
+            const { answer, answerProblem: problem, fields, mission } = get();
+            const times = allTimes(problem, answer);
+            return momentOf({ problem, answer, fields, times }, { ...mission, ...patch });
+        }""",
+        mission,
+    )
+
+
 @pytest.mark.parametrize(("example", "time"), [("cyclone-idai", 0.6), ("paper-5x10", 0.35)])
 def test_state_at_a_moment_is_the_specifications(page, service, example, time):
     ready(page)
@@ -51,12 +66,7 @@ def test_state_at_a_moment_is_the_specifications(page, service, example, time):
     answer = show_answer(page, service.url, algorithm="local_search", time_limit_s=0.5)
     problem = state(page, "problem")
 
-    now = page.evaluate(
-        "async (time) => { const { get } = await import('/dashboard/js/state.js');"
-        " const { problemAt } = await import('/dashboard/js/mid_mission.js');"
-        " return problemAt(get().answerProblem, get().answer, time); }",
-        time,
-    )
+    now = moment(page, clock=time)["now"]
 
     uavs, needs = expected_state(problem, answer, time)
     assert {target["id"]: target["loadlist"] for target in now["targets"]} == {
@@ -109,7 +119,10 @@ def test_lost_changed_and_new_are_allocated_again_and_the_difference_is_shown(pa
     shown = page.get_by_test_id("field-changes")
     values = [float(each.get_attribute("value")) for each in shown.locator("p data").all()]
     assert values[1] == answer["reward"]
-    assert values[1] >= values[0] - 1e-9 or math.isclose(*values, rel_tol=0.05)
+    # The rest of the old plan is what the new one begins with.
+    assert values[1] >= values[0] - 1e-9
+    assert {uav["available_from"] for uav in problem["uavs"] if not uav.get("ret")} >= {0.3}
+    assert page.locator("#field-time").input_value() == "0.3"
     expect(shown.locator(f"tr[data-uav={lost}]")).to_contain_text("lost")
     for route in answer["routes"]:
         if route["stops"]:
@@ -138,15 +151,14 @@ def test_keeping_the_plan_is_worth_what_its_rest_earns(page, service):
     ready(page)
     answer = show_answer(page, service.url, algorithm="local_search", time_limit_s=0.5)
 
-    kept = page.evaluate(
-        "async () => { const { get } = await import('/dashboard/js/state.js');"
-        " const m = await import('/dashboard/js/mid_mission.js');"
-        " const { answerProblem: p, answer: a } = get();"
-        " return m.changes(m.problemAt(p, a, 0), m.remainder(p, a, 0), a); }"
-    )
+    begin = moment(page, clock=0)
 
-    assert kept["kept"]["reward"] == pytest.approx(answer["reward"])
-    assert {route["kind"] for route in kept["routes"]} == {"same"}
+    assert begin["rest"]["reward"] == pytest.approx(answer["reward"])
+    assert begin["before"] == [[stop["target_id"] for stop in r["stops"]] for r in answer["routes"]]
+    later = moment(page, clock=0.3)
+    assert later["rest"]["reward"] == pytest.approx(
+        replay(later["now"], later["now"]["start_plan"])["reward"]
+    )
 
 
 def test_uavs_on_their_way_home_are_called_back_only_where_that_is_chosen(page, service):
@@ -154,72 +166,128 @@ def test_uavs_on_their_way_home_are_called_back_only_where_that_is_chosen(page, 
     answer = show_answer(page, service.url, algorithm="greedy")
     last = max(stop["arrival_time"] for route in answer["routes"] for stop in route["stops"])
 
-    kept, recalled = page.evaluate(
-        "async (time) => { const { get } = await import('/dashboard/js/state.js');"
-        " const { problemAt } = await import('/dashboard/js/mid_mission.js');"
-        " const { answerProblem: p, answer: a } = get();"
-        " return [false, true].map((recall) => problemAt(p, a, time, { recall })); }",
-        last + 0.2,
-    )
+    kept, recalled = (moment(page, clock=last + 0.2, recall=recall)["now"] for recall in (False, True))
 
     flown = [bool(route["stops"]) for route in answer["routes"]]
-    assert [uav["ret"] for uav in kept["uavs"]] == [int(flies) for flies in flown]
-    assert [uav["ret"] for uav in recalled["uavs"]] == [0] * len(flown)
+    assert [uav.get("ret", 0) for uav in kept["uavs"]] == [int(flies) for flies in flown]
+    assert [uav.get("ret", 0) for uav in recalled["uavs"]] == [0] * len(flown)
 
 
-MID_MISSION = """
-    const { changes, problemAt, remainder, withNeeds } = await load("mid_mission.js");
+def test_visits_that_are_not_allowed_any_more_fall_out_of_the_rest(page, service):
+    ready(page)
+    page.expected_troubles.append("422")
+    show_answer(page, service.url, algorithm="greedy")
+    before = moment(page, clock=0.01)
+    name = next(visits[-1] for visits in before["before"] if visits)
+
+    after = moment(page, clock=0.01, happened={name: {"loadlist": [0]}})
+
+    assert name not in {stop["target_id"] for r in after["rest"]["routes"] for stop in r["stops"]}
+    assert after["rest"]["reward"] < before["rest"]["reward"]
+    assert replay(after["now"], after["now"]["start_plan"])["reward"] == pytest.approx(
+        after["rest"]["reward"]
+    )
+
+
+def test_a_service_that_is_away_takes_nothing_of_the_mission(page, service):
+    ready(page)
+    page.expected_troubles.append("ERR_FAILED")
+    show_answer(page, service.url, algorithm="greedy")
+    go(page, "field")
+    expect(page.locator("[data-testid=field-uavs] tbody tr").first).to_be_visible()
+    page.route("**/evaluate", lambda route: route.abort())
+    page.locator("#field-time").fill("0.3")
+    page.locator("#field-time").press("Tab")
+    says = page.get_by_test_id("field-moment")
+    expect(says).to_contain_text("What remains at 0.3 is not known: The service cannot be reached")
+    page.get_by_label("mid-2 is lost").check()
+    page.get_by_role("button", name="Allocate again from here").click()
+    expect(page.get_by_test_id("field-status")).to_have_text("The service does not say what remains")
+    mission = state(page, "mission")
+    assert (mission["clock"], mission["lost"]) == (0.3, ["mid-2"])
+
+    page.unroute("**/evaluate")
+    page.get_by_role("button", name="Ask again").click()
+    expect(page.locator("[data-testid=field-uavs] tr[data-uav=mid-2]")).to_contain_text("lost")
+    expect(says).to_have_text("")
+
+
+def test_a_slow_service_is_shown_of_the_newest_moment_only(page, service):
+    ready(page)
+    answer = show_answer(page, service.url, algorithm="greedy")
+    route = max(answer["routes"], key=lambda each: each["distance"])
+    go(page, "field")
+    row = page.locator(f"[data-testid=field-uavs] tr[data-uav={route['uav_id']}]")
+    expect(row).to_be_visible()
+    held, asked = [], []
+
+    def hold_the_first(route):
+        asked.append(json.loads(route.request.post_data).get("at"))
+        held.append(route) if len(asked) == 1 else route.continue_()
+
+    page.route("**/evaluate", hold_the_first)
+    with page.expect_request("**/evaluate"):
+        page.locator("#field-time").fill("0.1")
+        page.locator("#field-time").press("Tab")
+    for clock in ("0.2", "0.4"):
+        page.locator("#field-time").fill(clock)
+        page.locator("#field-time").press("Tab")
+    expect(page.get_by_test_id("field-moment")).to_have_text("The service is asked what remains …")
+    held[0].continue_()
+    expect(page.get_by_test_id("field-moment")).to_have_text("")
+    # What was asked first is heard to its end; nothing between is asked for.
+    assert [at for at in asked if at is not None] == [0.1, 0.4]
+    uav = next(each for each in moment(page, clock=0.4)["now"]["uavs"] if each["id"] == route["uav_id"])
+    assert value(row.locator("td.n").first) == pytest.approx(uav["voyage"] - uav["dis"])
+
+
+MEASURE = """
+    const { changes, withNeeds } = await load("mid_mission.js");
     const { met } = await load("plan.js");
-    const now = problemAt(given.problem, given.answer, given.time);
-    const rest = remainder(given.problem, given.answer, given.time);
+    const { now } = given;
     return {
-        now,
         more: withNeeds(now.targets[0], [12, 0]),
         fewer: withNeeds(now.targets[0], [0, 0]),
         untouched: withNeeds(now.targets[2], [1, 0]),
         met: [...met(now, null).values()],
-        metThen: [...met(now, { unmet: [{ target_id: "half", remaining: [1, 0] }] }).values()],
-        kept: changes(now, rest, { routes: [], reward: 0, distance_weight: 0 }),
+        changes: changes({ uavs: [{ id: "u" }, { id: "gone" }] }, given, given.answer),
     };
 """
 
 
 def test_what_an_area_asked_for_at_first_stays_the_measure_of_what_it_has():
-    """82 are needed, 80 come at time 1; 90 were asked for at another area, of which 40 came before."""
-    uav = {"id": "u", "x_s": 0, "y_s": 0, "speed": 1, "voyage": 99, "loadlist": [130, 0]}
+    """82 were needed and 80 have come; 90 were asked for at another area, of which 40 came before."""
     place = {"x": 1, "y": 0}
-    problem = {
-        "uavs": [uav],
+    now = {
+        "uavs": [{"id": "u"}],
         "targets": [
-            {"id": "nearly", **place, "level": 2, "loadlist": [82, 0]},
+            {"id": "nearly", **place, "level": 2, "loadlist": [2, 0], "requested": [82, 0]},
             {"id": "half", **place, "level": 3, "loadlist": [50, 0], "requested": [90, 0]},
             {"id": "none", **place, "level": 1, "loadlist": [5, 5]},
         ],
     }
-    stops = [
-        {"target_id": "nearly", "step": 1, "arrival_time": 1, "distance": 1, "delivered": [80, 0]},
-        {"target_id": "half", "step": 2, "arrival_time": 2, "distance": 1, "delivered": [45, 0]},
+    lacking = [
+        {"target_id": "nearly", "remaining": [2, 0]},
+        {"target_id": "half", "remaining": [5, 0]},
+        {"target_id": "none", "remaining": [5, 5]},
     ]
-    answer = {
-        "routes": [{"uav_id": "u", "distance": 2, "return_distance": 1, "stops": stops}],
-        "distance_weight": 0,
-    }
+    answer = {"routes": [{"uav_id": "u", "stops": [{"target_id": "nearly"}]}], "unmet": lacking[1:]}
+    before = [["half"], ["none"]]
 
-    found = run_module(MID_MISSION, {"problem": problem, "answer": answer, "time": 1.5})
+    given = {"now": now, "rest": {"reward": 1.5, "unmet": lacking}, "before": before, "answer": answer}
+    found = run_module(MEASURE, given)
 
-    nearly, half, none = found["now"]["targets"]
-    assert (nearly["loadlist"], nearly["requested"]) == ([2, 0], [82, 0])
-    assert (half["loadlist"], half["requested"]) == ([50, 0], [90, 0])
-    assert (none["loadlist"], "requested" in none) == ([5, 5], False)
     assert (found["more"]["loadlist"], found["more"]["requested"]) == ([12, 0], [92, 0])
     assert (found["fewer"]["loadlist"], found["fewer"]["requested"]) == ([0, 0], [80, 0])
     assert "requested" not in found["untouched"]
     assert found["met"] == pytest.approx([80 / 82, 40 / 90, 0])
-    assert found["metThen"] == pytest.approx([1, 89 / 90, 1])
-    # What is still to come earns as the service reckons it: level · delivered / requested.
-    assert found["kept"]["kept"]["satisfaction"] == pytest.approx(3 * 45 / 90)
-    assert [area["before"] for area in found["kept"]["areas"]] == pytest.approx([80 / 82, 85 / 90, 0])
-    assert [area["after"] for area in found["kept"]["areas"]] == pytest.approx([80 / 82, 40 / 90, 0])
+    assert found["changes"]["kept"] == {"reward": 1.5}
+    assert [area["before"] for area in found["changes"]["areas"]] == pytest.approx([80 / 82, 85 / 90, 0])
+    assert [area["after"] for area in found["changes"]["areas"]] == pytest.approx([1, 85 / 90, 0])
+    assert found["changes"]["routes"] == [
+        {"uav_id": "u", "before": ["half"], "after": ["nearly"], "kind": "changed"},
+        {"uav_id": "gone", "before": ["none"], "after": [], "kind": "lost"},
+    ]
 
 
 def test_an_area_that_is_nearly_served_is_shown_and_weighed_as_that(page, service):

@@ -152,8 +152,13 @@ class Maker:
 
 
 def meaning(problem):
-    """A problem without settings that are not set."""
-    return {name: value for name, value in problem.items() if value != {}}
+    """A problem without settings that are not set, its zones with the ids that they get."""
+    given = {name: value for name, value in problem.items() if value != {}}
+    if "no_fly_zones" in given:
+        given["no_fly_zones"] = [
+            {"id": f"zone-{at}", **zone} for at, zone in enumerate(given["no_fly_zones"], 1)
+        ]
+    return given
 
 
 def test_whatever_goes_out_comes_back_the_same(openapi):

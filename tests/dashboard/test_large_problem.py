@@ -78,6 +78,6 @@ def test_its_answer_is_shown_in_portions_and_the_selected_is_always_there(large,
     ]
     assert [
         json.loads(each.locator("data").nth(0).get_attribute("value"))
-        for each in chosen.locator("td:nth-last-child(2)").all()
+        for each in chosen.locator("td:nth-last-child(3)").all()
     ] == [stop["arrival_time"] for stop in last["stops"]]
     assert httpx.get(f"{service.url}/healthz").is_success

@@ -1,7 +1,5 @@
 """Detours, zones, wind, waiting and names on the page, and a mission that follows them."""
 
-import math
-
 import pytest
 from dashboard_steps import go, open_problem, ready, show_answer, state
 from page_modules import run_module
@@ -133,68 +131,56 @@ def test_a_plan_without_a_world_shows_nothing_of_it(page, service):
         expect(page.locator(gone)).to_have_count(0)
 
 
-def at(problem, *times):
-    """What the UAV does at moments of the plan."""
+def test_what_a_uav_is_doing_by_the_answers_own_times():
+    """It waits on the ground from 1 to 4, flies for 5, serves until 9.5, waits again from 10 to 12."""
     code = """
-        const { uavAt } = await load("mid_mission.js");
-        return given.times.map((time) => uavAt(given.problem, given.answer, 0, time));
-    """
-    return run_module(code, {"problem": problem, "answer": ANSWER, "times": times})
-
-
-def test_where_a_uav_is_on_its_way():
-    # It waits on the ground from 1 to 4, flies the 10 in 5, serves until 9.5, waits again from 10 to 12.
-    before, under_way, serving, waiting, home = at(STILL, 3.0, 5.25, 9.25, 11.0, 16.0)
-    assert (before["place"], before["doing"], before["flown"]) == ([0, 0], "waiting", 0)
-    assert under_way["place"] == pytest.approx([2.0, -1.5])
-    assert under_way["flown"] == pytest.approx(2.5)
-    assert under_way["ahead"][1:] == [[4, -3], [8, 0]]
-    assert (serving["place"], serving["doing"], serving["done"]) == ([8, 0], "unloading", 1)
-    assert (waiting["place"], waiting["doing"], waiting["done"]) == ([9, 0], "waiting", 1)
-    length = 2 * math.hypot(4, 4) + 1
-    assert home["doing"] == "returning"
-    assert home["place"] == pytest.approx([4.5, 4.0])
-    assert home["flown"] == pytest.approx(11 + 12 / 2)
-    assert length > 12  # the answer's lengths are taken, not the page's own
-
-
-def test_in_wind_range_is_left_as_the_answer_says():
-    windy = {**ANSWER["routes"][0]["stops"][0], "range_left": 45.0}
-    answer = {**ANSWER, "routes": [{**ANSWER["routes"][0], "stops": [windy]}]}
-    code = """
-        const { uavAt } = await load("mid_mission.js");
-        return [6.5, 9.2].map((time) => uavAt(given.problem, given.answer, 0, time).flown);
-    """
-    assert run_module(code, {"problem": PROBLEM, "answer": answer}) == pytest.approx([7.5, 15.0])
-
-
-def test_the_problem_at_a_moment_has_its_times_on_the_same_clock():
-    problem = {
-        **STILL,
-        "uavs": [
-            {**STILL["uavs"][0], "endurance": 30, "available_until": 40, "committed": ["a", "b"]},
-        ],
-        "start_plan": [[1], [0]],
-        "objective": {"change_weight": 0.1},
-    }
-    code = """
-        const { problemAt, remainder, missionEnd, moments } = await load("mid_mission.js");
-        const { problem, answer } = given;
+        const { allTimes, course, doingAt, homeward } = await load("times.js");
+        const times = allTimes(given.problem, given.answer);
+        const [uav] = given.problem.uavs;
         return [
-            problemAt(problem, answer, 9.25), remainder(problem, answer, 5.25),
-            missionEnd(problem, answer), moments(problem, answer),
+            given.clocks.map((clock) => Object.values(doingAt(uav, times[0], clock))),
+            given.clocks.map((clock) => homeward(times[0], clock)),
+            course(given.problem, times),
+            [[1, 5], [0, 5], [1, 15]].map(([dis, clock]) => {
+                const stops = [{ id: "a", left: 5, arrival: 8, begin: 8, done: 8 }];
+                const none = { stops: [], home: 10 };
+                return [{ stops, home: 10 }, none].map((each) => doingAt({ ...uav, dis }, each, clock).doing);
+            }),
         ];
     """
-    now, rest, end, moments = run_module(code, {"problem": problem, "answer": ANSWER})
+    clocks = [3.0, 5.25, 9.25, 11.0, 12.0, 16.0, 20.0]
+    doing, homeward, course, aloft = run_module(code, {"problem": STILL, "answer": ANSWER, "clocks": clocks})
+    assert doing == [
+        ["waiting", "a"],
+        ["flying", "a"],
+        ["unloading", "a"],
+        ["waiting", "b"],
+        ["returning", None],
+        ["returning", None],
+        ["home", None],
+    ]
+    assert homeward == [False] * 5 + [True] * 2
+    assert course == {"begin": 1, "end": 20, "moments": [1, 9, 9.5, 10, 12, 20]}
+    # In the air when its plan begins, or on the ground; with a visit to make, or with none.
+    assert aloft == [["flying", "returning"], ["waiting", "idle"], ["home", "home"]]
+
+
+def test_the_clock_goes_on_and_so_do_all_times(page, service):
+    ready(page)
+    committed = {"uavs": [{**STILL["uavs"][0], "endurance": 30, "available_until": 40}]}
+    open_problem(page, {**STILL, **committed})
+    show_answer(page, service.url)
+    go(page, "field")
+    page.locator("#field-time").fill("7.5")
+    page.locator("#field-time").press("Tab")
+    page.locator("#view-field select[name=algorithm]").select_option("greedy")
+    page.get_by_role("button", name="Allocate again from here").click()
+    expect(page.get_by_test_id("field-changes")).to_be_visible()
+    now = state(page, "problem")
     (uav,) = now["uavs"]
-    assert (uav["available_from"], uav["available_until"]) == (0, 30.75)
-    assert (uav["airborne"], uav["committed"], uav["loadlist"]) == (5.25, ["b"], [6])
-    assert [area["earliest"] for area in now["targets"]] == [0, 2.75]
-    assert "start_plan" not in now
-    assert now["objective"] == {"distance_weight": 0.001}
-    (route,) = rest
-    assert route["stops"][0]["path"] == [pytest.approx([2.0, -1.5]), [4, -3], [8, 0]]
-    assert [stop["begin_time"] for stop in route["stops"]] == [3.75, 6.75]
-    assert route["landing"]["time"] == 14.75
-    assert end == 20
-    assert moments == [0, 6, 9, 9.5, 10, 12, 20]
+    assert (uav["available_from"], uav["available_until"], uav["committed"]) == (7.5, 40, ["a"])
+    assert uav["airborne"] > 0
+    assert [area.get("earliest", 0) for area in now["targets"]] == [9, 12]
+    assert page.locator("#field-time").input_value() == "7.5"
+    drawn = page.locator("path.route").get_attribute("d")
+    assert drawn.count("L") > 2  # what is left of the way goes round the zone

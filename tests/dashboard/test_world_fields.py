@@ -17,7 +17,7 @@ PROBLEM = {
     "materials": [{"name": "water", "weight": 1.5}, {"name": "=food"}],
     "no_fly_zones": [
         {"id": "airport", "polygon": SQUARE, "name": "Airport", "properties": {"k": [1]}},
-        {"polygon": SQUARE[:3]},
+        {"id": "zone-2", "polygon": SQUARE[:3]},
     ],
     "wind": {"speed": 2, "towards": 90},
     "start_plan": [[0, 2], [1, 2]],
@@ -146,7 +146,7 @@ def test_zones_are_polygons_of_a_map(openapi):
     ]
     files = [json.dumps({"type": "FeatureCollection", "features": [each]}) for each in given]
     taken, *refused = run(openapi, "return given.files.map(read);", files=files)
-    assert taken["problem"]["no_fly_zones"] == [{"name": "Airport", "polygon": SQUARE}]
+    assert taken["problem"]["no_fly_zones"] == [{"id": "zone-1", "name": "Airport", "polygon": SQUARE}]
     assert [each["refused"] for each in refused] == [
         "feature 1 has 1 holes: a zone has none",
         "feature 1 is a MultiPolygon: a zone is one Polygon",
@@ -179,28 +179,3 @@ def test_what_refers_to_an_item_follows_it(openapi):
     assert area["start_plan"] == [[0, 3], [1, 3]]
     assert uav["start_plan"] == [[0, 2, 2], [1, 2, 2]]
     assert len(area["targets"]) == len(uav["uavs"]) == 3
-
-
-def test_in_mid_mission_times_count_from_then_and_kept_promises_are_gone(openapi):
-    code = """
-        const { problemAt } = await load("mid_mission.js");
-        return problemAt(given.problem, given.answer, 2);
-    """
-    stop = {"target_id": "a", "step": 1, "arrival_time": 1.5, "distance": 1.5, "delivered": [2, 0]}
-    stays = {"uav_id": "v", "distance": 0, "return_distance": 0, "stops": []}
-    answer = {
-        "distance_weight": 0.5,
-        "routes": [{**stays, "uav_id": "u", "return_distance": 1, "stops": [stop]}, stays],
-    }
-    now = run(openapi, code, problem=PROBLEM, answer=answer)
-    assert (now["uavs"][0]["committed"], now["uavs"][0]["available_from"]) == ([], 0)
-    assert now["uavs"][0]["available_until"] == 7
-    assert now["targets"][0]["earliest"] == 0
-    assert "start_plan" not in now
-    assert now["objective"] == {
-        "half_life": 3,
-        "minimum_share": 0.5,
-        "minimum_weight": 2,
-        "distance_weight": 0.5,
-    }
-    assert (now["wind"], now["no_fly_zones"]) == (PROBLEM["wind"], PROBLEM["no_fly_zones"])

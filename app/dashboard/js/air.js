@@ -6,9 +6,14 @@ import { called } from "./plan.js";
 
 /** Zones and wind on a Leaflet map. */
 export class Air {
-  /** @param {L.Map} map @param {boolean} globe whether speeds are in km/h */
-  constructor(map, globe) {
+  /**
+   * @param {L.Map} map
+   * @param {boolean} globe whether speeds are in km/h
+   * @param {(event: object, id: string) => void} clicked is told of a zone that is clicked
+   */
+  constructor(map, globe, clicked) {
     this.map = map;
+    this.clicked = clicked;
     this.unit = globe ? " km/h" : "";
     map.createPane("zones").style.zIndex = 440;
     this.renderer = L.svg({ padding: 0.5, pane: "zones" });
@@ -32,8 +37,14 @@ export class Air {
       const drawn = L.polygon(corners, { renderer: this.renderer, className: "no-fly-zone", weight: 1.5, smoothFactor: 0 });
       drawn.bindTooltip(() => h("span", {}, `${called(zone)}: not to be flown through`), { sticky: true, className: "tip" });
       this.zones.addLayer(drawn);
+      drawn.on("click", (event) => this.clicked(event, zone.id));
       drawn.getElement().dataset.zoneId = zone.id;
     }
+  }
+
+  /** Make the zone that is selected stand out. @param {string | null} id */
+  mark(id) {
+    this.zones.eachLayer((drawn) => drawn.getElement().classList.toggle("selected", drawn.getElement().dataset.zoneId === id));
   }
 
   #drawWind(wind) {

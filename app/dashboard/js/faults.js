@@ -1,9 +1,11 @@
 /** What the service says of a field of the problem, with the way to it. */
 
 import { h } from "./dom.js";
+import { ZONES } from "./kinds.js";
 import { get, select, set } from "./state.js";
 
 const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
+const LISTS = ["uavs", "targets", ZONES];
 
 /**
  * A button that leads to what a JSON pointer is about.
@@ -13,9 +15,9 @@ const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision st
 export function wayTo(pointer, problem) {
   const [, kind, at, ...rest] = pointer.split("/");
   const field = rest.join("/");
-  const id = ["uavs", "targets"].includes(kind) ? problem[kind][Number(at)]?.id : undefined;
+  const id = LISTS.includes(kind) ? problem[kind]?.[Number(at)]?.id : undefined;
   const go = () => {
-    if (id !== undefined && get().problem[kind].some((item) => item.id === id)) select({ kind, id });
+    if (id !== undefined && get().problem[kind]?.some((item) => item.id === id)) select({ kind, id });
     set({ view: "problem" });
     const row = `table[data-kind="${kind}"] tr[data-id="${CSS.escape(id ?? "")}"]`;
     const cell = [field, rest[0] ?? ""].map((each) => document.querySelector(`${row} td[data-column^="${CSS.escape(each)}"]`)).find(Boolean);

@@ -1,9 +1,10 @@
 /** Undo and redo: a step holds what belongs together, the problem, its plan, the clock of the mission and the colours. */
 
+import { notify } from "./dom.js";
 import { BEGINNING, get, set } from "./state.js";
 
 const MOST_UNDONE = 100;
-const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "mission", "colours"];
+const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "draft", "mission", "colours"];
 
 /** What is on screen, as a step. */
 export function present() {
@@ -15,15 +16,19 @@ export function present() {
 export function change(patch) {
   const { problem, answer, past } = get();
   const worth = problem && (answer || problem.uavs.length || problem.targets.length);
-  set({ violations: [], ...patch, past: worth ? [...past, present()].slice(-MOST_UNDONE) : past, future: [] });
+  // What was changed by hand belongs to the plan that it was made of.
+  const draft = "answer" in patch && !("draft" in patch) ? { draft: null } : {};
+  set({ violations: [], ...draft, ...patch, past: worth ? [...past, present()].slice(-MOST_UNDONE) : past, future: [] });
 }
 
 /** Bring a plan on screen, with the problem that it answers. @param {object} [rest] of the store */
 export function showPlan(problem, answer, rest = {}) {
   const shown = { answer, answerProblem: problem, incumbent: null, mission: BEGINNING, ...rest };
   // A first plan takes nothing away: what is undone then is the newest edit.
+  const aside = get().draft;
   if (get().answer || ("problem" in rest && rest.problem !== get().problem)) change(shown);
   else set(shown);
+  if (aside) notify("The plan that you were changing is set aside: Undo brings it back", "info", { title: "Undo", act: undo });
 }
 
 export function undo() {
@@ -38,6 +43,6 @@ export function redo() {
 
 function goTo(step, past, future) {
   const { selection } = get();
-  const there = selection && step.problem[selection.kind].some(({ id }) => id === selection.id);
-  set({ ...step, past, future, incumbent: null, violations: [], selection: there ? selection : null });
+  const there = selection && step.problem[selection.kind]?.some(({ id }) => id === selection.id);
+  set({ draft: null, ...step, past, future, incumbent: null, violations: [], selection: there ? selection : null });
 }

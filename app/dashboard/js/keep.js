@@ -11,7 +11,7 @@ import { get, subscribe } from "./state.js";
 const DATABASE = "dispatch";
 const VERSION = 1;
 const TAB = "dispatch-mission";
-const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "mission", "colours", "job", "past", "future"];
+const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "draft", "mission", "colours", "job", "past", "future"];
 const STEPS_KEPT = 20;
 const MISSIONS_KEPT = 20;
 const REST_MS = 200;

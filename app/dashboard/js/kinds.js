@@ -8,7 +8,7 @@ export const ZONE = "zone";
 export const ZONES = "no_fly_zones";
 
 /** What ids begin with, by the list. */
-export const STEMS = Object.fromEntries(Object.entries(KINDS).map(([kind, list]) => [list, kind]));
+export const STEMS = Object.fromEntries(Object.entries({ ...KINDS, [ZONE]: ZONES }).map(([kind, list]) => [list, kind]));
 
 /** The id of an item at a place in a list, from 0; the service's own where it has none. */
 export function idOf(list, item, at) {

@@ -5,6 +5,7 @@ import { resume, running } from "./allocation.js";
 import { hasKey, json, onKeyNeeded, send, useKey } from "./api.js";
 import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
+import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
 import { keepMission, restore } from "./keep.js";
 import { DispatchMap } from "./map.js";
@@ -123,7 +124,8 @@ function onKeys(event) {
   const command = event.ctrlKey || event.metaKey;
   if (command && event.key.toLowerCase() === "z" && !typing) {
     event.preventDefault();
-    (event.shiftKey ? redo : undo)();
+    if (map.drawing && !event.shiftKey) map.drawing.takeBack();
+    else (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
     set({ view: "allocate" });
     allocateNow();
@@ -201,6 +203,7 @@ async function start() {
   document.addEventListener("keydown", onKeys);
   subscribe(["problem", "problemName"], titleProblem);
   keepColours();
+  judgeDrafts();
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();

@@ -2,13 +2,16 @@
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { Air } from "./air.js";
-import { paint } from "./colours.js";
 import { Graticule } from "./graticule.js";
-import { shortAmounts, shown } from "./dom.js";
-import { called, met, rangeLeft, rangeShare, routesOf, stateOf, sum, urgency } from "./plan.js";
-import { extent, move, place, position, remove, requestedBy } from "./problem.js";
+import { h, shortAmounts, shown } from "./dom.js";
+import { ZONES } from "./kinds.js";
+import { called, met, rangeLeft, rangeShare, stateOf, urgency } from "./plan.js";
+import { addZone, extent, fewestCorners, move, place, position, remove, requestedBy, update } from "./problem.js";
+import { Routes } from "./routes.js";
 import { get, select, subscribe } from "./state.js";
 import { areaDot, areaSymbol, aside, uavDot, uavSymbol } from "./symbols.js";
+import { ZoneCorners } from "./zone_corners.js";
+import { ZoneDrawing } from "./zone_drawing.js";
 
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -17,16 +20,8 @@ const EDITED_IN = "problem";
 const MANY = 150;
 const DOTS_FROM = 600;
 const SLOW_MS = 250;
-const FEW_STOPS = 80;
 const NUDGE_PX = 5;
 const NUDGES = { ArrowUp: [0, -NUDGE_PX], ArrowDown: [0, NUDGE_PX], ArrowLeft: [-NUDGE_PX, 0], ArrowRight: [NUDGE_PX, 0] };
-
-/** What stands beside a symbol or route, as text. */
-function tip(text) {
-  const made = document.createElement("span");
-  made.textContent = text;
-  return made;
-}
 
 /** A Leaflet map that follows the store. */
 export class DispatchMap {
@@ -38,6 +33,7 @@ export class DispatchMap {
     this.handled = false;
     this.fitting = false;
     this.placing = null;
+    this.drawing = null;
     this.symbols = new Map();
     this.later = null;
     this.shift = 0;
@@ -66,6 +62,26 @@ export class DispatchMap {
     this.placing?.ended();
     this.placing = null;
     this.element.classList.remove("placing");
+    this.drawing?.giveUp();
+  }
+
+  /** Draw a zone: clicks, and Space for the middle of the map, are its corners. @param {(drawing: ZoneDrawing | null) => void} changed is told of each corner; null: it has ended */
+  drawZone(changed) {
+    this.stopPlacing();
+    this.drawing = new ZoneDrawing(this.map, {
+      ...this.#places(), fewest: fewestCorners(), changed: () => changed(this.drawing),
+      ended: (polygon) => {
+        this.drawing = null;
+        if (polygon) addZone(polygon);
+        changed(null);
+      },
+    });
+    changed(this.drawing);
+  }
+
+  /** What those who change zones on this map need: positions on it and back. */
+  #places() {
+    return { crs: this.crs, position: (latlng) => this.#rounded(latlng), latLng: (point) => this.#latLng(point) };
   }
 
   /** Bring everything into sight. */
@@ -118,6 +134,7 @@ export class DispatchMap {
   }
 
   #make(crs) {
+    this.stopPlacing();
     this.map?.remove();
     const { settings } = get();
     const globe = crs === "wgs84";
@@ -136,14 +153,18 @@ export class DispatchMap {
     }
     new Graticule(globe).addTo(this.map);
     if (globe) L.control.scale({ imperial: false }).addTo(this.map);
-    this.air = new Air(this.map, globe);
-    this.map.createPane("routes").style.zIndex = 450;
-    this.renderer = L.svg({ padding: 0.5, pane: "routes" });
-    this.routes = L.layerGroup().addTo(this.map);
+    this.air = new Air(this.map, globe, (event, id) => this.#onZone(event, id));
+    this.map.createPane("outlines").style.zIndex = 460;
+    this.corners = new ZoneCorners(this.map, {
+      ...this.#places(), nudge: (event) => (event.altKey && NUDGES[event.key]) || null,
+      changed: (id, polygon) => update(ZONES, id, { polygon }),
+    });
+    this.routes = new Routes(this.map);
     this.markers = L.layerGroup().addTo(this.map);
     this.symbols.clear();
     this.map.on("movestart zoomstart", () => { this.handled ||= !this.fitting; });
-    this.map.on("click", ({ latlng }) => this.#onClick(latlng));
+    this.map.on("click", ({ latlng, originalEvent }) => this.#onClick(latlng, originalEvent));
+    this.map.on("dblclick", () => this.drawing?.finish());
   }
 
   #onProblem(problem) {
@@ -163,10 +184,9 @@ export class DispatchMap {
     clearTimeout(this.later);
     this.later = null;
     const began = performance.now();
-    if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
-      this.routes.clearLayers();
-      if (plan) this.#drawRoutes(planned, plan);
-      this.drawn = { plan, planned, shift: this.shift, routes: this.routes };
+    if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.uavs !== problem.uavs || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
+      this.routes.draw(planned, plan, problem, (point) => this.#latLng(point));
+      this.drawn = { plan, planned, uavs: problem.uavs, shift: this.shift, routes: this.routes };
     }
     this.air.draw(problem, (point) => this.#latLng(point), this.shift);
     const answer = plan && !Array.isArray(plan) && planned === problem ? plan : null;
@@ -185,33 +205,6 @@ export class DispatchMap {
   #drawSoon() {
     if ((this.took ?? 0) * 5 < SLOW_MS) return this.#draw();
     this.later ??= setTimeout(() => this.#draw(), Math.max(SLOW_MS, 4 * this.took));
-  }
-
-  #drawRoutes(problem, plan) {
-    const routes = routesOf(problem, plan);
-    const stops = sum(routes.map((route) => route.stops.length));
-    this.element.classList.toggle("numbered", stops <= FEW_STOPS);
-    for (const { uav, index, points, stops: visits } of routes) {
-      const line = L.polyline(points.map((point) => this.#latLng(point)), { renderer: this.renderer, className: "route", weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
-      line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });
-      line.bindTooltip(() => tip(`${called(uav)}: ${visits.map(({ target }) => called(target)).join(" → ")}`), { sticky: true, className: "tip" });
-      this.routes.addLayer(line);
-      const path = line.getElement();
-      paint(path, uav.id);
-      Object.assign(path.dataset, { uavId: uav.id, stops: visits.map(({ target }) => target.id).join("\n") });
-      if (stops <= FEW_STOPS) visits.forEach(({ target }, at) => this.#drawOrder(uav, index, target, at + 1));
-    }
-  }
-
-  #drawOrder(uav, index, target, order) {
-    const label = document.createElement("span");
-    label.textContent = order;
-    paint(label, uav.id);
-    const beside = [-9 + 16 * (index % 3), 26];
-    const icon = L.divIcon({ className: "order", html: label, iconSize: [15, 15], iconAnchor: beside });
-    const marker = L.marker(this.#latLng(target), { icon, interactive: false, keyboard: false, zIndexOffset: 500 });
-    this.routes.addLayer(marker);
-    marker.getElement().dataset.uavId = uav.id;
   }
 
   #drawAreas(problem, answer) {
@@ -269,7 +262,7 @@ export class DispatchMap {
     const marker = L.marker(this.#latLng(at), { icon, keyboard: false, riseOnHover: !this.dots });
     marker.on("click", () => select({ kind, id }));
     marker.on("dragend", () => this.#moveTo(kind, id, marker.getLatLng()));
-    marker.bindTooltip(() => tip(drawn.says()), { direction: "top", offset: [dx, dy - size / 2], className: "tip" });
+    marker.bindTooltip(() => h("span", {}, drawn.says()), { direction: "top", offset: [dx, dy - size / 2], className: "tip" });
     this.markers.addLayer(marker);
     const element = marker.getElement();
     Object.assign(element.dataset, { kind, id });
@@ -301,10 +294,12 @@ export class DispatchMap {
   #onView() {
     this.stopPlacing();
     for (const symbol of this.symbols.values()) this.#allowMoving(symbol);
+    this.#markSelection();
   }
 
   #markSelection() {
     const { selection } = get();
+    this.#markZone(selection?.kind === ZONES ? selection.id : null);
     for (const [key, { marker, element }] of this.symbols) {
       const chosen = selection !== null && key === `${selection.kind} ${selection.id}`;
       if (element.classList.contains("selected") === chosen) continue;
@@ -317,9 +312,23 @@ export class DispatchMap {
     }
   }
 
-  #onClick(latlng) {
-    if (!this.placing) return select(null);
-    place(this.placing.kind, this.#rounded(latlng));
+  #markZone(id) {
+    if (!this.map) return;
+    this.air.mark(id);
+    this.corners.show(this.#shown().problem[ZONES]?.find((zone) => zone.id === id) ?? null, this.#editable(), this.shift);
+  }
+
+  #onClick(latlng, event = null) {
+    if (this.drawing) return this.drawing.add(latlng);
+    if (this.placing) return place(this.placing.kind, this.#rounded(latlng));
+    // The second click of the double click that ended a zone means nothing more.
+    if (!(event?.detail > 1)) select(null);
+  }
+
+  #onZone(event, id) {
+    if (this.placing || this.drawing) return;
+    L.DomEvent.stop(event);
+    select({ kind: ZONES, id });
   }
 
   #moveTo(kind, id, latlng) {
@@ -335,14 +344,23 @@ export class DispatchMap {
     return { x: Number(x.toFixed(Math.min(digits, 12))), y: Number(lat.toFixed(Math.min(digits, 12))) };
   }
 
+  #onDrawingKey(event) {
+    const act = { Enter: () => this.drawing.finish(), " ": () => this.drawing.addMiddle(), Backspace: () => this.drawing.takeBack() }[event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+
   #onKey(event) {
+    if (this.drawing && event.target === this.element) return this.#onDrawingKey(event);
     if (event.key === "Enter" && this.placing && event.target === this.element) return this.#onClick(this.map.getCenter());
     const { selection } = get();
-    if (!selection || !this.#editable()) return;
+    if (!selection || !this.#editable() || this.drawing) return;
     if (event.key === "Delete") remove(selection.kind, selection.id);
     if (event.altKey && NUDGES[event.key]) {
       event.preventDefault();
       event.stopPropagation();
+      if (selection.kind === ZONES) return this.corners.move(NUDGES[event.key]);
       const { marker } = this.symbols.get(`${selection.kind} ${selection.id}`);
       const to = this.map.latLngToLayerPoint(marker.getLatLng()).add(NUDGES[event.key]);
       this.#moveTo(selection.kind, selection.id, this.map.layerPointToLatLng(to));

@@ -1,14 +1,16 @@
 /** The problem on screen: making, editing, undoing. All of it in the API's own fields. */
 
+import { notify } from "./dom.js";
 import { change } from "./history.js";
-import { STEMS } from "./kinds.js";
+import { STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
-import { amountsOf } from "./schema.js";
+import { amountsOf, itemFields } from "./schema.js";
 import { BEGINNING, get, select, set } from "./state.js";
 
 /** A problem with ids filled in and what is not set left out. */
 export function normalised({ uavs = [], targets = [], ...settings }) {
-  return { ...present(settings), uavs: named(uavs, STEMS.uavs), targets: named(targets, STEMS.targets) };
+  const zones = settings[ZONES]?.length ? { [ZONES]: named(settings[ZONES], STEMS[ZONES]) } : {};
+  return { ...present(settings), ...zones, uavs: named(uavs, STEMS.uavs), targets: named(targets, STEMS.targets) };
 }
 
 /** Items with ids: the service's own by place in the list, or the next that is free. */
@@ -57,7 +59,7 @@ export function edit(changed) {
   change({ problem: { ...problem, ...changed(problem) } });
 }
 
-/** Change fields of a UAV or area; undefined takes a field out. @param {"uavs"|"targets"} kind */
+/** Change fields of a UAV, area or zone; undefined takes a field out. @param {"uavs"|"targets"|"no_fly_zones"} kind */
 export function update(kind, id, fields) {
   edit((problem) => {
     const items = problem[kind].map((item) => (item.id === id ? present({ ...item, ...fields }) : item));
@@ -96,7 +98,28 @@ export function place(kind, { x, y }) {
   select({ kind, id });
 }
 
-/** An id that none of the items has. @param {"uavs"|"targets"} kind */
+/** Add a zone, and select it. @param {number[][]} polygon its corners */
+export function addZone(polygon) {
+  const zones = get().problem[ZONES] ?? [];
+  const zone = { id: freeId(ZONES, zones), polygon };
+  edit(() => ({ [ZONES]: [...zones, zone] }));
+  select({ kind: ZONES, id: zone.id });
+}
+
+/** Take a corner out of a zone, as long as enough are left. */
+export function withoutCorner(id, at) {
+  const { polygon } = get().problem[ZONES].find((zone) => zone.id === id);
+  const fewest = fewestCorners();
+  if (polygon.length <= fewest) return notify(`A zone has at least ${fewest} corners: delete the whole zone instead`, "error");
+  update(ZONES, id, { polygon: polygon.toSpliced(at, 1) });
+}
+
+/** How many corners a zone has at least, as the service says. */
+export function fewestCorners() {
+  return itemFields(get().fields, ZONES).polygon.minItems;
+}
+
+/** An id that none of the items has. @param {"uavs"|"targets"|"no_fly_zones"} kind */
 export function freeId(kind, items) {
   const taken = new Set(items.map((item) => item.id));
   let n = items.length + 1;

@@ -7,6 +7,8 @@ import { newOpening, normalised } from "./problem.js";
 import { BEGINNING, get } from "./state.js";
 
 const KINDS = new Set(["allocate", "batch"]);
+/** Plans that are listed at least, where there are as many. */
+const ENOUGH = 20;
 const ENDED = new Set(["succeeded", "failed", "cancelled"]);
 
 /**
@@ -15,8 +17,14 @@ const ENDED = new Set(["succeeded", "failed", "cancelled"]);
  * @returns {Promise<{jobs: object[], next: string | null}>}
  */
 export async function recentPlans(cursor = null) {
-  const page = await json(`jobs?limit=50${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
-  return { jobs: page.jobs.filter(({ kind }) => KINDS.has(kind)), next: page.next_cursor };
+  const jobs = [];
+  // A mission that is looked at moment by moment leaves many jobs of another kind between the plans.
+  do {
+    const page = await json(`jobs?limit=100${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
+    jobs.push(...page.jobs.filter(({ kind }) => KINDS.has(kind)));
+    cursor = page.next_cursor;
+  } while (cursor && jobs.length < ENOUGH);
+  return { jobs, next: cursor };
 }
 
 /**

@@ -1,5 +1,6 @@
 /** What in a problem refers to its UAVs and areas: ids in lists of words, and the places in a plan to begin from. */
 
+import { ZONES } from "./kinds.js";
 import { isIdsOf } from "./schema.js";
 
 /** A problem in which an item of a list has another id wherever it is named. */
@@ -9,6 +10,7 @@ export function withRenamed(problem, fields, list, before, after) {
 
 /** A problem whose list has lost the item at a place: nothing names it, and the plan goes on without it. */
 export function withRemoved(problem, fields, list, at) {
+  if (list === ZONES) return { ...problem, [list]: problem[list].toSpliced(at, 1) };
   const { id } = problem[list][at];
   const home = problem.targets.length;
   const without = withIds({ ...problem, [list]: problem[list].toSpliced(at, 1) }, fields, list, (ids) => ids.filter((each) => each !== id));

@@ -30,6 +30,11 @@ export function fieldsOf(openapi) {
   return { learners, uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request) };
 }
 
+/** JSON schemas of the fields of an item of a list of the problem. @param {object} fields as `fieldsOf` gives them */
+export function itemFields(fields, list) {
+  return fields[list] ?? fields.settings[list].items.properties;
+}
+
 /** Whether a field holds one amount a material. */
 export function isAmounts(schema) {
   return schema.type === "array" && ["number", "integer"].includes(schema.items?.type);

@@ -19,6 +19,7 @@ let state = Object.freeze({
   job: null,
   answer: null,
   answerProblem: null,
+  draft: null,
   mission: BEGINNING,
   incumbent: null,
   violations: [],
@@ -59,7 +60,7 @@ export function subscribe(keys, listen) {
   return () => listeners.delete(entry);
 }
 
-/** Select a UAV or an area, or nothing. @param {null | {kind: "uavs"|"targets", id: string}} selection */
+/** Select a UAV, an area or a zone, or nothing. @param {null | {kind: "uavs"|"targets"|"no_fly_zones", id: string}} selection */
 export function select(selection) {
   const now = state.selection;
   if (now?.kind === selection?.kind && now?.id === selection?.id) return;

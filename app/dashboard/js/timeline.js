@@ -2,9 +2,10 @@
 
 import { paint } from "./colours.js";
 import { h, shortAmounts, shown } from "./dom.js";
-import { called, names, waiting } from "./plan.js";
+import { called, names } from "./plan.js";
 import { Portions } from "./portions.js";
 import { select } from "./state.js";
+import { allTimes } from "./times.js";
 
 /**
  * Draw the timelines of an answer.
@@ -13,8 +14,8 @@ import { select } from "./state.js";
  * @returns {{element: HTMLElement | null, portions: Portions | null}} null where nobody flies
  */
 export function timeline(problem, answer) {
-  const targets = new Map(problem.targets.map((target) => [target.id, target]));
-  const rows = problem.uavs.map((uav, index) => ({ uav, ...timesOf(uav, answer.routes[index], targets) })).filter(({ stops }) => stops.length);
+  const times = allTimes(problem, answer);
+  const rows = problem.uavs.map((uav, index) => ({ uav, ...times[index] })).filter(({ stops }) => stops.length);
   const nameOf = names(problem.targets);
   const end = Math.max(0, ...rows.map(({ home }) => home)) || 1;
   const share = (time) => `${(100 * time) / end}%`;
@@ -46,21 +47,4 @@ export function timeline(problem, answer) {
   if (!rows.length) return { element: null, portions: null };
   const element = h("ol", { class: "timeline", "aria-label": "Timeline of each UAV" }, ticks);
   return { element, portions: new Portions(element, rows, row, (button) => h("li", {}, button)) };
-}
-
-/** When a UAV leaves for each stop, arrives, begins and is done there, when it waits, and when it is home. */
-function timesOf(uav, route, targets) {
-  let left = uav.available_from ?? 0;
-  const stops = route.stops.map((stop, n) => {
-    const arrival = stop.arrival_time;
-    const begin = stop.begin_time ?? arrival;
-    const done = stop.departure_time ?? arrival + (targets.get(stop.target_id).service_time ?? 0);
-    const { time, onGround } = waiting(uav, stop, n);
-    const times = { id: stop.target_id, left, arrival, begin, done, delivered: stop.delivered, waits: null };
-    if (time > 0 && onGround) Object.assign(times, { left: left + time, arrival: begin, waits: { from: left, to: left + time, onGround } });
-    else if (time > 0) times.waits = { from: arrival, to: begin, onGround };
-    left = done;
-    return times;
-  });
-  return { stops, home: route.landing?.time ?? left + route.return_distance / uav.speed };
 }

@@ -5,7 +5,7 @@
 
 import { KINDS, ZONE, ZONES } from "../kinds.js";
 import { position } from "../problem.js";
-import { heldSettings, isAmounts, isWords } from "../schema.js";
+import { heldSettings, isAmounts, isWords, itemFields } from "../schema.js";
 import { wordsIn } from "../words.js";
 import { FormatError } from "./error.js";
 
@@ -62,7 +62,7 @@ export function fromGeoJson(collection, present, fields) {
     const known = { ...KINDS, [ZONE]: ZONES };
     const kind = known[String(given ?? "").toLowerCase()];
     if (!kind) throw new FormatError(`${name} has no property \`kind\` that is ${Object.keys(KINDS).join(", ")} or ${ZONE}`);
-    const schemas = kind === ZONES ? fields.settings[ZONES].items.properties : fields[kind];
+    const schemas = itemFields(fields, kind);
     const item = {};
     for (const [field, value] of Object.entries(properties)) {
       if (field === "id" || value === null) continue;

@@ -1,12 +1,14 @@
 /** Allocate: algorithm, parameters and limits as the service describes them; the reward climbing live. */
 
 import { allocate, cancel, running } from "../allocation.js";
+import { beginningNotes } from "../beginning.js";
 import { drawCurves } from "../curve.js";
 import { h, number, shown } from "../dom.js";
 import { wayTo } from "../faults.js";
 import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
 import { get, set, subscribe } from "../state.js";
+import { crossingNotes } from "../zone_form.js";
 
 /** The field that asks to keep what is learned: only some algorithms learn. */
 const KEEPING = "keep_checkpoint";
@@ -43,7 +45,7 @@ function makeForm() {
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
   const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
     labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element,
-    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place),
+    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place), beginningNotes(), crossingNotes(),
     h("div", { class: "row" }, start, stop), elsewhere);
   form.addEventListener("submit", (event) => {
     event.preventDefault();

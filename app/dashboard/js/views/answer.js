@@ -1,12 +1,15 @@
 /** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
 
-import { paint } from "../colours.js";
 import { amounts, h, number, shown } from "../dom.js";
-import { called, names, sum, waiting } from "../plan.js";
+import { assignmentOf, visitsOf } from "../draft.js";
+import { beginDraft, beginWith } from "../drafting.js";
+import { editorOf, judgement } from "../plan_editor.js";
+import { names, sum } from "../plan.js";
 import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { requestedBy } from "../problem.js";
 import { registerView } from "../registry.js";
+import { routesTable } from "../routes_table.js";
 import { get, select, set, subscribe } from "../state.js";
 import { timeline } from "../timeline.js";
 
@@ -35,38 +38,11 @@ function boundFigures({ bound, gap }) {
 }
 
 function source(answer) {
+  if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, "A plan that was changed by hand");
   const policy = answer.source_policy;
   const how = [`${answer.algorithm}, seed ${answer.seed} `, answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
   return h("p", { class: "hint", id: "source" }, how, ". Policy ", h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
-}
-
-/** What stands beside an arrival where the visit begins later. */
-function waitHint(uav, stop, n) {
-  const { time, onGround } = waiting(uav, stop, n);
-  return time > 0 ? h("p", { class: "hint" }, "waits ", number(time), onGround ? " on the ground, begins " : ", begins ", number(stop.begin_time)) : null;
-}
-
-function routeRows(uav, route, nameOf) {
-  return route.stops.map((stop, n) => {
-    const key = paint(h("span", { class: "key", "aria-hidden": "true" }), route.uav_id);
-    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, called(uav)), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
-    return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
-      h("td", { class: "num" }, String(n + 1)), h("td", { title: stop.target_id }, nameOf(stop.target_id)), h("td", { class: "num" }, number(stop.arrival_time), waitHint(uav, stop, n)),
-      h("td", { class: "num" }, amounts(stop.delivered)));
-  });
-}
-
-function routesTable(problem, answer) {
-  const head = ["UAV", "#", "Area", problem.crs === "wgs84" ? "Arrives, h" : "Arrives", "Unloads"];
-  const out = answer.routes.filter((route) => route.stops.length);
-  if (!out.length) return h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance.");
-  const body = h("tbody", {});
-  const uavs = new Map(problem.uavs.map((uav) => [uav.id, uav]));
-  const nameOf = names(problem.targets);
-  long.routes = new Portions(body, out, (route) => routeRows(uavs.get(route.uav_id), route, nameOf), (button) => h("tr", {}, h("td", { colspan: "5" }, button)));
-  return h("details", { open: true }, h("summary", {}, `Routes of ${out.length} of ${problem.uavs.length} UAVs`),
-    h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [1, 3, 4].includes(at) ? "num" : null }, title)))), body)));
 }
 
 function unmetList(problem, answer) {
@@ -83,33 +59,95 @@ function unmetList(problem, answer) {
   return h("details", { open: answer.unmet.length > 0 }, h("summary", {}, title), list);
 }
 
+/** Do something to the plan on screen, in a line of its own below the figures. */
+function acts() {
+  const button = (title, does) => h("button", { type: "button", onclick: does }, title);
+  return h("div", { class: "row", id: "plan-acts" }, button("Change this plan", beginDraft), button("Begin the next allocation with it", () => {
+    const { answer, answerProblem } = get();
+    beginWith(visitsOf(answerProblem, answer));
+    set({ view: "allocate" });
+  }));
+}
+
+let shownMap = null;
+
+/** While the plan is changed, the map of this view has it as it is changed. */
+function drawMap() {
+  const { answerProblem, draft, view } = get();
+  if (draft && view === "answer") {
+    shownMap.showPlan(answerProblem, draft.evaluation ?? assignmentOf(answerProblem, draft.visits));
+    drawMap.given = true;
+  } else if (drawMap.given) {
+    drawMap.given = false;
+    shownMap.showPlan(null);
+  }
+}
+
 registerView({
   id: "answer", title: "Answer", order: 30, layout: "panel",
-  mount(root, { dock }) {
+  mount(root, { map, dock }) {
+    shownMap = map;
     const stale = staleNote("stale", "The problem was changed after this answer.");
+    const locks = h("p", { class: "hint", role: "status", id: "locks-say" });
+    const [head, routes, rest] = [h("div", { class: "block" }), h("div", { class: "block" }), h("div", { class: "block" })];
+    let markLocks = () => {};
+    let editor = null;
+    const drawHead = ({ answer, answerProblem, draft }) => {
+      if (draft) head.replaceChildren(stale, judgement(answerProblem, answer, draft));
+      else head.replaceChildren(stale, figures(answer), source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), acts());
+    };
+    const drawRoutes = ({ answer, answerProblem, draft }) => {
+      long.routes = null;
+      markLocks = () => {};
+      if (draft) {
+        if (editor?.visits !== draft.visits) editor = editorOf();
+        editor.mark(draft);
+        if (!editor.element.isConnected) routes.replaceChildren(editor.element);
+        editor.focus();
+        return;
+      }
+      editor = null;
+      const table = routesTable(answerProblem, answer, (text) => { locks.textContent = text; });
+      long.routes = table.portions;
+      markLocks = table.markLocks;
+      routes.replaceChildren(table.element, locks);
+    };
+    const drawRest = ({ answer, answerProblem, draft }) => {
+      // Until the service has said something of the draft, what it said last stays.
+      if (draft && !draft.evaluation && !draft.refusal) return;
+      Object.assign(long, { unmet: null, timeline: null });
+      if (draft?.refusal) {
+        rest.replaceChildren(h("p", { class: "hint" }, "What is unmet is known as soon as no rule is broken."));
+        return dock.replaceChildren();
+      }
+      const plan = draft?.evaluation ?? answer;
+      rest.replaceChildren(unmetList(answerProblem, plan));
+      const { element, portions } = timeline(answerProblem, plan);
+      long.timeline = portions;
+      dock.replaceChildren(...(element ? [element] : []));
+    };
     const draw = () => {
-      const { answer, answerProblem } = get();
-      if (!answer) {
+      const state = get();
+      if (!state.answer) {
+        editor = null;
         root.replaceChildren(h("p", { class: "hint" }, "No plan yet."), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, "Allocate")));
         return dock.replaceChildren();
       }
-      Object.assign(long, { routes: null, unmet: null, timeline: null });
-      root.replaceChildren(stale, figures(answer), source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), routesTable(answerProblem, answer), unmetList(answerProblem, answer));
-      const { element, portions } = timeline(answerProblem, answer);
-      long.timeline = portions;
-      dock.replaceChildren(...(element ? [element] : []));
+      if (!head.isConnected) root.replaceChildren(head, routes, rest);
+      for (const part of [drawHead, drawRoutes, drawRest]) part(state);
       markSelection();
     };
     const markSelection = () => {
       const { selection } = get();
       if (selection?.kind === "uavs") {
         long.routes?.reveal((route) => route.uav_id === selection.id);
+        editor?.reveal((uav) => uav.id === selection.id);
         long.timeline?.reveal(({ uav }) => uav.id === selection.id);
       } else if (selection) {
         long.routes?.reveal((route) => route.stops.some((stop) => stop.target_id === selection.id));
         long.unmet?.reveal((unmet) => unmet.target_id === selection.id);
       }
-      for (const row of [...root.querySelectorAll("#routes tbody tr"), ...dock.querySelectorAll("li[data-uav-id]")]) {
+      for (const row of [...root.querySelectorAll(":is(#routes, #draft-routes) tbody tr"), ...dock.querySelectorAll("li[data-uav-id]")]) {
         const chosen = selection?.kind === "uavs" ? row.dataset.uavId === selection.id : selection !== null && row.dataset.targetId === selection.id;
         row.classList.toggle("chosen", chosen);
       }
@@ -122,10 +160,17 @@ registerView({
       act();
       if (clicked?.isConnected) root.closest(".panel").scrollTop += clicked.getBoundingClientRect().top - was;
     };
-    subscribe(["answer"], draw);
+    subscribe(["answer", "draft"], (_, changed) => {
+      if (changed.includes("answer")) locks.textContent = "";
+      draw();
+      drawMap();
+    });
+    subscribe(["problem"], () => markLocks());
     subscribe(["selection"], () => held(markSelection));
     root.addEventListener("click", ({ target }) => { clicked = target.closest("button"); }, { capture: true });
     root.addEventListener("click", () => { clicked = null; });
     draw();
   },
+  show: drawMap,
+  hide: drawMap,
 });

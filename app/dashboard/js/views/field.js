@@ -3,23 +3,31 @@
 import { ApiError } from "../api.js";
 import { h, notify, number, shortAmounts, shown } from "../dom.js";
 import { showPlan, undo } from "../history.js";
-import { changes, missionEnd, moments, problemAt, remainder, uavAt, withNeeds } from "../mid_mission.js";
-import { called, names, sum } from "../plan.js";
+import { changes, momentOf } from "../mid_mission.js";
+import { called, names, rangeLeft, sum } from "../plan.js";
 import { answeredBy } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { freeId } from "../problem.js";
+import { differenceOf } from "../outcome.js";
 import { registerView } from "../registry.js";
 import { allocate } from "../running.js";
 import { BEGINNING, get, set, subscribe } from "../state.js";
+import { allTimes, course, doingAt } from "../times.js";
 
-const FRAMES = 240; // the whole mission in about 12 s
+const RUN_MS = 12_000; // the whole mission
 const FRAME_MS = 50;
-const MOST_FRAMES = 3; // left out at once where drawing is slow
+const MOST_MS = 300; // that are left out at once where the service is slow
 const FEW_KINDS = 8;
+/** What of a mission changes what remains. */
+const FACTS = ["clock", "lost", "happened", "found", "recall"];
 
 let parts = null;
 let map = null;
-let ticking = null;
+let running = null; // the run that goes on by itself
+let known = null; // the newest moment that the service has said, of which plan and mission
+let asking = null; // the moment that is asked for
+let looking = false; // whether what is on screen follows as soon as it is known
+let waitingAreas = false; // whether areas are to be drawn when nobody writes in them any more
 const unfolded = new Set(); // areas of many kinds whose needs are to be seen
 let shownUavs = 0; // rows that were asked for
 let shownAreas = 0;
@@ -47,14 +55,21 @@ function mount(root, context) {
     start: h("button", { type: "submit", class: "primary" }, "Allocate again from here"),
     stop: h("button", { type: "button", class: "quiet", disabled: true, onclick: () => stopping?.abort() }, "Stop"),
     status: h("p", { class: "muted", role: "status", "data-testid": "field-status" }),
+    moment: h("p", { class: "muted", role: "status", "data-testid": "field-moment" }),
   };
   parts.time.addEventListener("input", () => moveTo(Number(parts.time.value)));
   parts.exact.addEventListener("change", () => moveTo(Number(parts.exact.value)));
+  parts.areas.addEventListener("focusout", ({ relatedTarget }) => {
+    if (!waitingAreas || parts.areas.contains(relatedTarget) || !upToDate()) return;
+    waitingAreas = false;
+    drawAreas(known.moment.now);
+  });
   parts.body.append(
     h("section", { class: "card" },
       h("h3", {}, "Clock"),
       h("p", { class: "clock" }, parts.time, parts.exact, parts.shown),
-      h("p", { class: "actions" }, parts.before, " ", parts.run, " ", parts.next)),
+      h("p", { class: "actions" }, parts.before, " ", parts.run, " ", parts.next),
+      parts.moment),
     h("section", { class: "card" }, h("h3", {}, "UAVs"), parts.uavs,
       h("label", { class: "line" }, h("span", {}, "UAVs that fly home, or are back, may get tasks again"), parts.recall)),
     h("section", { class: "card" }, h("h3", {}, "Areas"), parts.areas,
@@ -103,8 +118,17 @@ function begin() {
 }
 
 function plan() {
-  const { answer, answerProblem } = get();
-  return { answer, problem: answerProblem };
+  const { answer, answerProblem: problem } = get();
+  if (known?.answer !== answer || known.problem !== problem) {
+    const times = allTimes(problem, answer);
+    known = { answer, problem, times, course: course(problem, times), facts: null, moment: null };
+  }
+  return known;
+}
+
+/** Where the clock is: a plan may begin later than at 0. */
+function clock() {
+  return Math.max(plan().course.begin, get().mission.clock);
 }
 
 /** Take down what has happened in the mission until now. */
@@ -113,109 +137,139 @@ function note(patch) {
 }
 
 function moveTo(time) {
-  const { answer, problem } = plan();
-  note({ clock: Math.min(Math.max(0, time || 0), missionEnd(problem, answer)) });
+  const { begin, end } = plan().course;
+  note({ clock: Math.min(Math.max(begin, time || 0), end) });
 }
 
 function step(way) {
-  const { answer, problem } = plan();
-  const { clock } = get().mission;
-  const all = moments(problem, answer);
-  const next = way > 0 ? all.find((at) => at > clock + 1e-9) : all.findLast((at) => at < clock - 1e-9);
+  const { moments } = plan().course;
+  const now = clock();
+  const next = way > 0 ? moments.find((at) => at > now + 1e-9) : moments.findLast((at) => at < now - 1e-9);
   if (next !== undefined) moveTo(next);
 }
 
 function toggle() {
-  if (ticking) halt();
-  else {
-    const { answer, problem } = plan();
-    const end = missionEnd(problem, answer);
-    if (get().mission.clock >= end) note({ clock: 0 });
-    parts.run.textContent = "Halt";
-    const tick = () => {
-      const began = performance.now();
-      moveTo(get().mission.clock + (end / FRAMES) * Math.min(MOST_FRAMES, Math.max(1, took / FRAME_MS)));
-      took = performance.now() - began;
-      if (get().mission.clock >= end) halt();
-      else ticking = setTimeout(tick, Math.max(FRAME_MS - took, took));
-    };
-    let took = 0;
-    ticking = setTimeout(tick, FRAME_MS);
+  if (running) halt();
+  else void run();
+}
+
+/** Let the clock go, as fast as the service says what is then. */
+async function run() {
+  const { begin, end } = plan().course;
+  if (clock() >= end) note({ clock: begin });
+  const mine = (running = {});
+  parts.run.textContent = "Halt";
+  let took = FRAME_MS;
+  while (running === mine) {
+    const began = performance.now();
+    moveTo(clock() + ((end - begin) * Math.min(MOST_MS, took)) / RUN_MS);
+    if (!(await moment()) || clock() >= end) break;
+    await new Promise((resolve) => setTimeout(resolve, Math.max(FRAME_MS - (performance.now() - began), 0)));
+    took = performance.now() - began;
   }
+  if (running === mine) halt();
 }
 
 function halt() {
-  clearTimeout(ticking);
-  ticking = null;
+  running = null;
   if (parts) parts.run.textContent = "Let it run";
 }
 
-/** The problem at the moment, with what has happened. */
-function present() {
-  const { answer, problem } = plan();
-  const { clock, lost, happened, found, recall } = get().mission;
-  const at = problemAt(problem, answer, clock, { lost: new Set(lost), recall });
-  const told = (target) => {
-    const { loadlist = target.loadlist, ...fields } = happened[target.id] ?? {};
-    return { ...(loadlist === target.loadlist ? target : withNeeds(target, loadlist)), ...fields };
-  };
-  return { ...at, targets: [...at.targets.map(told), ...found] };
+function factsOf(mission) {
+  return FACTS.map((name) => mission[name]);
+}
+
+/** Whether the newest moment that is known is the one on screen. */
+function upToDate() {
+  const facts = factsOf(get().mission);
+  return plan().facts?.every((fact, at) => Object.is(fact, facts[at])) ?? false;
+}
+
+/**
+ * What remains at the moment on screen; null where the service does not say. While it is asked for one moment, and
+ * another is on screen by then, it is asked for that one next.
+ */
+async function moment() {
+  while (get().answer && !upToDate()) {
+    asking ??= ask().finally(() => { asking = null; });
+    const { found, of, mission } = await asking;
+    if (!found && of === plan() && mission === get().mission) return null;
+  }
+  return get().answer && known.moment;
+}
+
+/** Ask for the moment on screen; say whether it was found, and of which plan and mission. */
+async function ask() {
+  const of = plan();
+  const { mission } = get();
+  if (!running) parts.moment.textContent = "The service is asked what remains …";
+  try {
+    const found = await momentOf({ ...of, fields: get().fields }, { ...mission, clock: clock() });
+    Object.assign(of, { facts: factsOf(mission), moment: found });
+    parts.moment.textContent = "";
+    return { found: true, of, mission };
+  } catch (error) {
+    parts.moment.replaceChildren(`What remains at ${shown(mission.clock)} is not known: ${error.message}. What you noted is kept. `, h("button", { type: "button", onclick: () => void look() }, "Ask again"));
+    if (error instanceof ApiError && error.violations.length) set({ violations: error.violations });
+    return { found: false, of, mission };
+  }
+}
+
+/** Have the moment on screen, as soon as the service says it. */
+async function look() {
+  if (looking) return;
+  looking = true;
+  const found = await moment();
+  looking = false;
+  if (found && get().view === "field") drawMoment(found);
 }
 
 function draw() {
-  const { answer, problem } = plan();
-  const { clock, recall } = get().mission;
-  const end = missionEnd(problem, answer);
-  parts.recall.checked = recall;
-  parts.time.max = String(end);
-  parts.time.value = String(clock);
-  parts.exact.max = String(end);
-  parts.exact.value = String(Number(clock.toPrecision(6)));
-  parts.shown.textContent = `${shown(clock)} of ${shown(end)}${problem.crs === "wgs84" ? " h" : ""}`;
-  const now = present();
-  drawUavs(now);
-  if (!parts.areas.contains(document.activeElement)) drawAreas(now);
-  drawMap(now);
-  drawOutcome();
+  const { problem, course: { begin, end } } = plan();
+  const now = clock();
+  parts.recall.checked = get().mission.recall;
+  for (const input of [parts.time, parts.exact]) Object.assign(input, { min: String(begin), max: String(end) });
+  parts.time.value = String(now);
+  parts.exact.value = String(Number(now.toPrecision(6)));
+  parts.shown.textContent = `${shown(now)} of ${shown(end)}${problem.crs === "wgs84" ? " h" : ""}`;
+  const { answer, answerProblem, mission: { outcome } } = get();
+  parts.dock.replaceChildren(...(outcome ? [differenceOf(outcome, answerProblem, answer)] : []));
+  if (!plan().moment) for (const place of [parts.uavs, parts.areas]) place.replaceChildren();
+  if (upToDate()) drawMoment(known.moment);
+  else void look();
 }
 
-function drawMap(now) {
-  const { answer, problem } = plan();
-  const { clock, lost } = get().mission;
-  const rest = remainder(problem, answer, clock, new Set(lost));
-  const coming = new Map();
-  for (const { stops } of rest)
-    for (const { target_id: id, delivered } of stops)
-      coming.set(id, delivered.map((amount, k) => amount + (coming.get(id)?.[k] ?? 0)));
-  const unmet = now.targets
-    .map(({ id, loadlist }) => ({ target_id: id, remaining: loadlist.map((need, k) => Math.max(0, need - (coming.get(id)?.[k] ?? 0))) }))
-    .filter(({ remaining }) => remaining.some((amount) => amount > 1e-9));
-  map.showPlan(now, { routes: rest, unmet });
+function drawMoment({ now, rest }) {
+  drawUavs(now);
+  waitingAreas = parts.areas.contains(document.activeElement);
+  if (!waitingAreas) drawAreas(now);
+  map.showPlan(now, rest ?? now.start_plan ?? null);
 }
 
 function drawUavs(now) {
-  const { answer, problem } = plan();
-  const { clock, lost } = get().mission;
+  const { problem, times } = plan();
+  const { lost } = get().mission;
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
   const nameOf = names([...problem.targets, ...now.targets]);
+  const back = problem.objective?.return_to_base === false ? "landed" : "home";
   const body = h("tbody", {});
   parts.uavs.replaceChildren(
     h("table", { "data-testid": "field-uavs" },
       h("thead", {}, h("tr", {}, ["UAV", "Doing", "Range left", "Load", "Lost"].map((title, i) => h("th", { scope: "col", class: i === 2 || i === 3 ? "n" : null }, title)))),
       body));
   const rows = new Portions(body, problem.uavs, (uav, i) => {
-        const is = uavAt(problem, answer, i, clock);
-        const doing = { flying: `to ${nameOf(is.next)}`, unloading: `at ${nameOf(is.next)}` }[is.doing] ?? is.doing;
-        const gone = lost.includes(uav.id);
-        return h("tr", { class: gone ? "lost" : null, "data-uav": uav.id },
+        const { doing, next } = doingAt(uav, times[i], clock());
+        const says = { flying: `to ${nameOf(next)}`, unloading: `at ${nameOf(next)}`, home: back }[doing] ?? doing;
+        const is = left.get(uav.id);
+        return h("tr", { class: is ? null : "lost", "data-uav": uav.id },
           h("th", { scope: "row", title: uav.id }, called(uav)),
-          h("td", {}, gone ? "lost" : doing),
-          h("td", { class: "n" }, gone ? "–" : number(uav.voyage - is.flown)),
-          h("td", { class: "n load" }, gone ? "–" : shortAmounts(left.get(uav.id).loadlist, " · ")),
+          h("td", {}, is ? says : "lost"),
+          h("td", { class: "n" }, is ? number(rangeLeft(is)) : "–"),
+          h("td", { class: "n load" }, is ? shortAmounts(is.loadlist, " · ") : "–"),
           h("td", {}, h("input", {
-            type: "checkbox", "aria-label": `${uav.id} is lost`, checked: gone,
+            type: "checkbox", "aria-label": `${uav.id} is lost`, checked: !is,
             onchange: (event) => {
-              const others = get().mission.lost.filter((id) => id !== uav.id);
+              const others = lost.filter((id) => id !== uav.id);
               note({ lost: event.target.checked ? [...others, uav.id] : others });
             },
           })));
@@ -278,7 +332,7 @@ function amountField(target, amount, k) {
   return h("input", {
     type: "number", step: "any", min: "0", value: String(Number(amount.toPrecision(12))), "aria-label": `need ${k + 1} of ${target.id}`,
     onchange: (event) => {
-      const loadlist = present().targets.find(({ id }) => id === target.id).loadlist.slice();
+      const loadlist = known.moment.now.targets.find(({ id }) => id === target.id).loadlist.slice();
       loadlist[k] = Number(event.target.value);
       changed(target, { loadlist });
     },
@@ -293,7 +347,8 @@ function changed(target, fields) {
 
 /** A new area in the middle of the others; its place, level and needs are to be filled in. */
 function discover() {
-  const { targets } = present();
+  if (!known?.moment) return;
+  const { targets } = known.moment.now;
   const middle = (name) => targets.reduce((total, target) => total + target[name], 0) / targets.length;
   const level = Math.max(...targets.map((target) => target.level));
   const loadlist = targets[0].loadlist.map((_, k) => Math.max(...plan().problem.targets.map((target) => target.loadlist[k])));
@@ -303,20 +358,18 @@ function discover() {
 
 async function again() {
   halt();
-  const { answer, problem } = plan();
-  const now = present();
-  if (!now.uavs.length) {
-    notify("Every UAV is lost: nobody is left to fly.", "error");
-    return;
-  }
-  const { clock, lost } = get().mission;
   const { opened } = get();
-  const rest = remainder(problem, answer, clock, new Set(lost));
   stopping = new AbortController();
   parts.start.disabled = true;
   parts.stop.disabled = false;
   parts.status.textContent = "Allocating …";
   try {
+    const from = await moment();
+    if (!from) throw new Error("The service does not say what remains");
+    const { now } = from;
+    const { problem } = known;
+    const at = clock();
+    if (!now.uavs.length) throw new Error("Every UAV is lost: nobody is left to fly.");
     const given = await allocate(
       { ...now, algorithm: parts.algorithm.value, time_limit_s: Number(parts.limit.value) },
       {
@@ -327,10 +380,10 @@ async function again() {
       });
     if (given && get().opened !== opened) notify("The plan of the mission before is ready: it is among the recent plans");
     else if (given) {
-      parts.status.textContent = `A new plan from ${shown(clock)} on: reward ${shown(given.reward)}. Undo goes back to the mission before.`;
+      parts.status.textContent = `A new plan from ${shown(at)} on: reward ${shown(given.reward)}. Undo goes back to the mission before.`;
       parts.status.append(...[answeredBy(given)].filter(Boolean));
       notify("A new plan is on screen", "info", { title: "Undo", act: undo });
-      showPlan(now, given, { problem: now, mission: { ...BEGINNING, outcome: changes(now, rest, given) }, selection: null });
+      showPlan(now, given, { problem: now, mission: { ...BEGINNING, clock: at, outcome: changes(problem, from, given) }, selection: null });
     } else parts.status.textContent = "Stopped before there was a plan.";
   } catch (error) {
     if (error instanceof ApiError) set({ violations: error.violations });
@@ -340,36 +393,4 @@ async function again() {
     parts.start.disabled = false;
     parts.stop.disabled = true;
   }
-}
-
-/** What the newest plan changed, as long as it is the mission on screen. */
-function drawOutcome() {
-  const { answer, answerProblem, mission: { outcome: difference } } = get();
-  if (!difference) {
-    parts.dock.replaceChildren();
-    return;
-  }
-  const [uavOf, areaOf] = [names(answerProblem.uavs), names(answerProblem.targets)];
-  const list = (ids) => (ids.length ? ids.map(areaOf).join(" → ") : "home");
-  const percent = (share) => (share === null ? "–" : `${Math.round(100 * share)} %`);
-  const gained = answer.reward - difference.kept.reward;
-  const moved = difference.areas.filter(({ before, after }) => Math.abs((before ?? 0) - (after ?? 0)) > 1e-6);
-  parts.dock.replaceChildren(
-    h("section", { class: "difference", "data-testid": "field-changes" },
-      h("h3", {}, "What the new plan changes"),
-      h("p", {}, "Going on with the old plan would earn ", number(difference.kept.reward), ", the new one earns ",
-        number(answer.reward), " (", h("strong", {}, `${gained >= 0 ? "+" : ""}${shown(gained)}`), ")."),
-      h("div", { class: "two" },
-        h("table", {},
-          h("thead", {}, h("tr", {}, ["UAV", "Before", "Now", ""].map((title) => h("th", { scope: "col" }, title)))),
-          h("tbody", {}, difference.routes.filter((route) => route.kind === "lost" || route.before.length || route.after.length).map((route) =>
-            h("tr", { "data-uav": route.uav_id, class: route.kind },
-              h("th", { scope: "row", title: route.uav_id }, uavOf(route.uav_id)), h("td", {}, list(route.before)),
-              h("td", {}, route.kind === "lost" ? "–" : list(route.after)), h("td", {}, h("span", { class: "chip" }, route.kind)))))),
-        h("table", {},
-          h("thead", {}, h("tr", {}, ["Area", "Met before", "Met now"].map((title, i) => h("th", { scope: "col", class: i ? "n" : null }, title)))),
-          h("tbody", {}, moved.length
-            ? moved.map((area) => h("tr", { "data-area": area.target_id },
-              h("th", { scope: "row", title: area.target_id }, areaOf(area.target_id)), h("td", { class: "n" }, percent(area.before)), h("td", { class: "n" }, percent(area.after))))
-            : h("tr", {}, h("td", { colspan: "3" }, "Every area gets what it would have got.")))))));
 }

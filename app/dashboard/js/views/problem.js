@@ -6,20 +6,23 @@ import { Fields, labelled } from "../fields.js";
 import { read, toCsv, toGeoJson, toJson } from "../formats.js";
 import { Grid } from "../grid.js";
 import { redo, undo } from "../history.js";
+import { ZONES } from "../kinds.js";
 import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
-import { amountsOf, isAmounts, isWords } from "../schema.js";
+import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
 import { get, select, subscribe } from "../state.js";
 import { wordsIn, writtenWords } from "../words.js";
+import { cornersOf, drawingControls } from "../zone_form.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
 /** What people call the fields that have other names; all others go by their own. */
 const TITLES = {
   uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
   targets: { id: "Area", level: "urgency", loadlist: "need" },
+  [ZONES]: { id: "Zone" },
 };
-const KINDS = { uavs: "UAVs", targets: "Areas" };
+const KINDS = { uavs: "UAVs", targets: "Areas", [ZONES]: "Zones" };
 /** Types of settings that have one value, and so one form field. */
 const SINGLE = ["number", "integer", "boolean", "string"];
 const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
@@ -32,9 +35,9 @@ function columnsOf(kind, problem) {
     const title = TITLES[kind][name] ?? name.replaceAll("_", " ");
     return globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title;
   };
-  const known = get().fields?.[kind] ?? {};
+  const known = get().fields ? itemFields(get().fields, kind) : {};
   const plain = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
-  const held = ([name, schema]) => isAmounts(schema) && problem[kind].some((item) => item[name]);
+  const held = ([name, schema]) => isAmounts(schema) && problem[kind]?.some((item) => item[name]);
   const shownAs = (value, schema) => (value && isWords(schema) ? writtenWords(value) : value);
   const scalars = Object.entries(known).filter(plain).map(([name, schema]) => ({
     name, title: titled(name), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
@@ -52,7 +55,7 @@ function enter(kind, id, name, text) {
     if (!text || get().problem[kind].some((each) => each.id === text)) return notify(`Another id is needed than “${text}”`, "error");
     return update(kind, id, { id: text });
   }
-  const schema = get().fields[kind][name];
+  const schema = itemFields(get().fields, kind)[name];
   if (schema && isWords(schema)) {
     const words = text === "" ? undefined : wordsIn(text);
     return words === null ? notify(`${name} of ${id} needs words with semicolons between`, "error") : update(kind, id, { [name]: words });
@@ -83,7 +86,7 @@ function mountTables(dock) {
     }
   };
   const buttons = Object.fromEntries(Object.entries(KINDS).map(([kind]) => [kind, h("button", { type: "button", class: "quiet", dataset: { table: kind }, onclick: () => choose(kind) })]));
-  dock.append(h("div", { class: "dock-bar" }, Object.values(buttons)), grids.uavs.element, grids.targets.element);
+  dock.append(h("div", { class: "dock-bar" }, Object.values(buttons)), ...Object.values(grids).map(({ element }) => element));
   const faults = (kind) =>
     new Map(get().violations.filter((v) => v.pointer.startsWith(`/${kind}/`)).map((v) => [v.pointer.slice(kind.length + 2), v.detail]));
   const mark = () => {
@@ -97,8 +100,9 @@ function mountTables(dock) {
   const draw = () => {
     const { problem } = get();
     for (const kind of Object.keys(KINDS)) {
-      grids[kind].show(problem[kind], columnsOf(kind, problem));
-      buttons[kind].textContent = `${KINDS[kind]} ${problem[kind].length}`;
+      const items = problem[kind] ?? [];
+      grids[kind].show(items, columnsOf(kind, problem));
+      buttons[kind].textContent = `${KINDS[kind]} ${items.length}`;
     }
     mark();
   };
@@ -180,15 +184,17 @@ function placing(map) {
   const enable = () => { back.disabled = !get().past.length; forth.disabled = !get().future.length; };
   subscribe(["past", "future"], enable);
   enable();
-  return h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
+  const zone = drawingControls(map);
+  const row = h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
+  return [row, zone.steps];
 }
 
 /** Fields of what is selected, each under its own label. */
 function mountInspector(root) {
   const draw = () => {
     const { selection, problem } = get();
-    const item = selection && problem[selection.kind].find((each) => each.id === selection.id);
-    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV or an area on the map or in the table to see and change it."));
+    const item = selection && problem[selection.kind]?.find((each) => each.id === selection.id);
+    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area or a zone on the map or in the table to see and change it."));
     const { kind, id } = selection;
     const at = problem[kind].indexOf(item);
     const fields = columnsOf(kind, problem).map((column) => {
@@ -197,7 +203,7 @@ function mountInspector(root) {
       return labelled(column.title, input, { pointer: `/${kind}/${at}/${column.name}` });
     });
     const facts = kind === "uavs" ? `${stateOf(item)}, range left ${shown(rangeLeft(item), 6)} of ${shown(item.voyage, 6)}` : "";
-    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), h("div", { class: "grid3" }, fields)));
+    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
   };
   subscribe(["selection", "problem", "fields"], draw);
   draw();
@@ -246,7 +252,7 @@ registerView({
     root.append(
       h("div", { class: "block" }, h("h2", {}, "Examples"), examples),
       h("div", { class: "block" }, h("h2", {}, "Import and export"), filesCard()),
-      h("div", { class: "block" }, h("h2", {}, "Edit"), placing(map), inspector),
+      h("div", { class: "block" }, h("h2", {}, "Edit"), ...placing(map), inspector),
       h("details", {}, h("summary", {}, "Settings of the problem"), settings),
     );
     mountTables(dock);

@@ -1,0 +1,60 @@
+/** When the UAVs of a plan do what, by the answer's own times. */
+
+import { stateOf, waiting } from "./plan.js";
+
+/** When a UAV leaves for each stop, arrives, begins and is done there, when it waits, and when it is home. */
+export function timesOf(uav, route, targets) {
+  let left = uav.available_from ?? 0;
+  const stops = route.stops.map((stop, n) => {
+    const arrival = stop.arrival_time;
+    const begin = stop.begin_time ?? arrival;
+    const done = stop.departure_time ?? arrival + (targets.get(stop.target_id).service_time ?? 0);
+    const { time, onGround } = waiting(uav, stop, n);
+    const times = { id: stop.target_id, left, arrival, begin, done, delivered: stop.delivered, waits: null };
+    if (time > 0 && onGround) Object.assign(times, { left: left + time, arrival: begin, waits: { from: left, to: left + time, onGround } });
+    else if (time > 0) times.waits = { from: arrival, to: begin, onGround };
+    left = done;
+    return times;
+  });
+  return { stops, home: route.landing?.time ?? left + route.return_distance / uav.speed };
+}
+
+/** The same of every UAV of a problem. */
+export function allTimes(problem, answer) {
+  const targets = new Map(problem.targets.map((target) => [target.id, target]));
+  return problem.uavs.map((uav, i) => timesOf(uav, answer.routes[i], targets));
+}
+
+/** From when to when a plan goes, and every moment at which something happens, in order, each once. */
+export function course(problem, times) {
+  const flying = problem.uavs.filter((uav) => !uav.ret);
+  const begin = flying.length ? Math.min(...flying.map((uav) => uav.available_from ?? 0)) : 0;
+  const all = new Set([begin]);
+  for (const { stops, home } of times) {
+    for (const { arrival, begin: begins, done, waits } of stops) for (const at of [waits && !waits.onGround ? waits.from : arrival, begins, done]) all.add(at);
+    if (home > begin) all.add(home);
+  }
+  const moments = [...all].filter((at) => at >= begin).sort((a, b) => a - b);
+  return { begin, end: moments.at(-1), moments };
+}
+
+/** Whether a UAV has made all its visits by a clock, and flies home or is back. */
+export function homeward({ stops }, clock) {
+  return stops.length > 0 && clock > stops.at(-1).done;
+}
+
+/**
+ * What a UAV is doing at a clock.
+ * @returns {{doing: "idle" | "waiting" | "flying" | "unloading" | "returning" | "home", next: string | null}} `next` is the area
+ */
+export function doingAt(uav, { stops, home }, clock) {
+  const aloft = stateOf(uav) !== "at its base";
+  for (const [n, { id, left, begin, arrival, done }] of stops.entries()) {
+    // At the very moment it leaves it flies only where it was in the air before.
+    if (clock < arrival) return { doing: clock > left || (clock === left && (aloft || n > 0)) ? "flying" : "waiting", next: id };
+    if (clock < begin) return { doing: "waiting", next: id };
+    if (clock < done) return { doing: "unloading", next: id };
+  }
+  if (!stops.length && !aloft) return { doing: "idle", next: null };
+  return { doing: clock < home ? "returning" : "home", next: null };
+}
