@@ -235,7 +235,7 @@ export class DispatchMap {
         if (base.turnaround) lines.push(`turnaround ${shown(base.turnaround)}`);
         return lines.join("\n");
       };
-      const looks = { size: 20, name: called(base), stock: stockText(base.stock) };
+      const looks = { size: 34, name: called(base), stock: stockText(base.stock) };
       this.#addSymbol(BASES, base, base, () => depotSymbol(looks), [0, 0], looks, says);
     }
   }

@@ -259,7 +259,8 @@ function drawUavs(now) {
       body));
   const rows = new Portions(body, problem.uavs, (uav, i) => {
         const { doing, next } = doingAt(uav, times[i], clock());
-        const says = { flying: `to ${nameOf(next)}`, unloading: `at ${nameOf(next)}`, reloading: `reloads at ${nameOf(next)}`, home: back }[doing] ?? doing;
+        const place = next === null ? "" : nameOf(next);
+        const says = { flying: `to ${place}`, unloading: `at ${place}`, reloading: `reloads at ${place}`, home: back }[doing] ?? doing;
         const is = left.get(uav.id);
         return h("tr", { class: is ? null : "lost", "data-uav": uav.id },
           h("th", { scope: "row", title: uav.id }, called(uav)),

@@ -18,7 +18,7 @@ import { cornersOf, drawingControls } from "../zone_form.js";
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
 /** What people call the fields that have other names; all others go by their own. */
 const TITLES = {
-  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
+  uavs: { id: "UAV", x_s: "start x", y_s: "start y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
   targets: { id: "Area", level: "urgency", loadlist: "need" },
   [BASES]: { id: "Base" },
   [ZONES]: { id: "Zone" },
