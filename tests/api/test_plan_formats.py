@@ -109,7 +109,7 @@ def check_as_qgroundcontrol(content):
 def test_waypoints_load_in_pymavlink_and_are_the_plan(tmp_path):
     route = two_visits().routes[0]
     file = tmp_path / "mission.waypoints"
-    file.write_text(waypoint_file(route, FlightChoices(altitude_m=80.0)))
+    file.write_text(waypoint_file(route.flights[0], FlightChoices(altitude_m=80.0)))
 
     loader = mavwp.MAVWPLoader()
     loader.load(str(file))
@@ -131,7 +131,7 @@ def test_waypoints_load_in_pymavlink_and_are_the_plan(tmp_path):
 def test_plan_file_keeps_the_rules_of_qgroundcontrols_loader():
     route = two_visits().routes[0]
 
-    content = json.loads(plan_file(route, FlightChoices(altitude_m=80.0)))
+    content = json.loads(plan_file(route.flights[0], FlightChoices(altitude_m=80.0)))
 
     check_as_qgroundcontrol(content)
     items = content["mission"]["items"]
@@ -145,8 +145,8 @@ def test_both_formats_say_the_same(delivery, end):
     route = two_visits().routes[0]
     choices = FlightChoices(delivery=delivery, end=end, servo_channel=7, servo_pwm_us=1100, gripper=2)
 
-    codes, loader = commands(waypoint_file(route, choices))
-    content = json.loads(plan_file(route, choices))
+    codes, loader = commands(waypoint_file(route.flights[0], choices))
+    content = json.loads(plan_file(route.flights[0], choices))
 
     check_as_qgroundcontrol(content)
     items = content["mission"]["items"]
@@ -167,7 +167,7 @@ def test_both_formats_say_the_same(delivery, end):
 
 @pytest.mark.parametrize("on_its_way", [{"dis": 5.0}, {"x_c": 34.1}])
 def test_uav_on_its_way_does_not_take_off_again(on_its_way):
-    codes, _ = commands(waypoint_file(two_visits(**on_its_way).routes[0], FlightChoices()))
+    codes, _ = commands(waypoint_file(two_visits(**on_its_way).routes[0].flights[0], FlightChoices()))
 
     assert TAKEOFF not in codes
 
@@ -176,7 +176,7 @@ def test_range_that_does_not_suffice_is_named_for_every_place():
     route = two_visits(voyage=100.0).routes[0]
 
     with pytest.raises(OutOfRange) as caught:
-        plan_file(route, FlightChoices())
+        plan_file(route.flights[0], FlightChoices())
 
     found = {error.pointer: error.detail for error in caught.value.errors}
     assert set(found) == {"/routes/0/stops/1/range_left", "/routes/0/range_left"}
@@ -188,8 +188,8 @@ def test_flight_that_ends_at_the_last_stop_needs_no_range_for_the_way_home():
     route = two_visits(voyage=110.0).routes[0]
 
     with pytest.raises(OutOfRange, match="at home"):
-        plan_file(route, FlightChoices())
-    codes, _ = commands(waypoint_file(route, FlightChoices(end=Ending.LAND)))
+        plan_file(route.flights[0], FlightChoices())
+    codes, _ = commands(waypoint_file(route.flights[0], FlightChoices(end=Ending.LAND)))
 
     assert codes[-1] == LAND
 
@@ -207,12 +207,12 @@ def test_flight_that_ends_at_the_last_stop_needs_no_range_for_the_way_home():
 )
 def test_choices_are_checked(choice, named):
     with pytest.raises(OutOfRange, match=named):
-        plan_file(two_visits().routes[0], FlightChoices(**choice))
+        plan_file(two_visits().routes[0].flights[0], FlightChoices(**choice))
 
 
 def test_stay_that_no_autopilot_can_be_told_is_refused():
     with pytest.raises(OutOfRange, match="72000 s"):
-        plan_file(two_visits(service_time=20.0).routes[0], FlightChoices())
+        plan_file(two_visits(service_time=20.0).routes[0].flights[0], FlightChoices())
 
 
 def test_geojson_has_the_whole_plan():
@@ -331,7 +331,10 @@ def test_printed_page_has_every_stop_and_escapes_ids():
 def test_file_names_are_safe():
     plan = two_visits(ids=("../../etc/паром", "..."))
 
-    assert [file_name(route, "plan") for route in plan.routes] == ["001-etc.plan", "002-uav.plan"]
+    assert [file_name(route.flights[0], "plan", numbered=False) for route in plan.routes] == [
+        "001-etc.plan",
+        "002-uav.plan",
+    ]
 
 
 @pytest.fixture(scope="module")

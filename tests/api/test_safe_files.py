@@ -26,7 +26,13 @@ def plan_of(**problem):
     """A plan in which each UAV flies to every area, in turn; its numbers mean nothing."""
     problem = to_problem(ProblemModel(**problem), Settings())
     stops = [
-        {"target_id": target.id, "step": 1, "arrival_time": 0.1, "distance": 1.0, "delivered": [0.0]}
+        {
+            "target_id": target.id,
+            "step": 1,
+            "arrival_time": 0.1,
+            "distance": 1.0,
+            "delivered": [0.0] * len(target.loadlist),
+        }
         for target in problem.targets
     ]
     routes = [

@@ -56,7 +56,9 @@ def items_of(text):
 def test_a_mission_flies_over_the_corners_and_loiters_until_the_visit_begins():
     plan, answer = flown()
     (first, second), home = answer["routes"][0]["stops"], answer["routes"][0]["landing"]
-    items = items_of(waypoint_file(plan.routes[0], FlightChoices(delivery=Delivery.NONE, altitude_m=80)))
+    items = items_of(
+        waypoint_file(plan.routes[0].flights[0], FlightChoices(delivery=Delivery.NONE, altitude_m=80))
+    )
 
     places = [[item.y, item.x] for item in items if item.command == WAYPOINT][1:]
     ways = [*first["path"][1:], [34.6, -19.0], *home["path"][1:-1]]
@@ -72,7 +74,7 @@ def test_a_mission_flies_over_the_corners_and_loiters_until_the_visit_begins():
 
 def test_a_plan_file_has_zones_as_fences_and_says_when_to_take_off():
     plan, answer = flown()
-    content = json.loads(plan_file(plan.routes[0], FlightChoices()))
+    content = json.loads(plan_file(plan.routes[0].flights[0], FlightChoices()))
     assert content["geoFence"]["polygons"] == [
         {"version": 1, "inclusion": False, "polygon": [[y, x] for x, y in CORNERS]}
     ]
@@ -83,31 +85,33 @@ def test_a_plan_file_has_zones_as_fences_and_says_when_to_take_off():
     assert "on the ground" in note
     still = replace(PROBLEM, uavs=(replace(PROBLEM.uavs[0], available_from=0.0), PROBLEM.uavs[1]))
     still = replace(still, targets=tuple(replace(target, earliest=0.0) for target in still.targets))
-    assert "notes" not in json.loads(plan_file(flown(still)[0].routes[0], FlightChoices()))
+    assert "notes" not in json.loads(plan_file(flown(still)[0].routes[0].flights[0], FlightChoices()))
 
 
 def test_in_wind_every_leg_has_its_speed_over_ground():
     problem = replace(PROBLEM, no_fly_zones=(), wind=Wind(30.0, 90.0))
     plan, answer = flown(problem)
-    items = items_of(waypoint_file(plan.routes[0], FlightChoices(delivery=Delivery.NONE)))
+    items = items_of(waypoint_file(plan.routes[0].flights[0], FlightChoices(delivery=Delivery.NONE)))
     told = [item.param2 for item in items if item.command == SPEED]
     first, _ = answer["routes"][0]["stops"]
     assert told == [20.0, pytest.approx(first["distance"] / (first["arrival_time"] - 0.5) / 3.6, rel=1e-6)]
     assert told[1] == pytest.approx((72 + 30) / 3.6, rel=1e-3)
     # Against the wind on the way home the air length is longer than the way.
     route = plan.routes[0]
-    assert route.range_left < route.stops[-1].range_left - 1.5 * route.return_distance
-    assert route.return_time == answer["routes"][0]["landing"]["time"]
+    assert route.landing.range_left < route.stops[-1].range_left - 1.5 * route.landing.distance
+    assert route.landing.time == answer["routes"][0]["landing"]["time"]
 
 
 def test_who_need_not_return_has_no_way_home_round_zones():
     plan, _ = flown(replace(PROBLEM, objective=Objective(return_to_base=False)))
     route = plan.routes[0]
-    assert route.return_time is None
+    assert route.landing.time is None
     with pytest.raises(OutOfRange, match="no way home"):
-        plan_file(route, FlightChoices())
+        plan_file(route.flights[0], FlightChoices())
     landed = FlightChoices(end=Ending.LAND, delivery=Delivery.NONE)
-    assert [item["command"] for item in json.loads(plan_file(route, landed))["mission"]["items"]][-1] == 21
+    assert [item["command"] for item in json.loads(plan_file(route.flights[0], landed))["mission"]["items"]][
+        -1
+    ] == 21
     rows = list(csv.DictReader(io.StringIO(csv_table(plan))))
     assert [(row["event"], row["time"] == "") for row in rows if row["uav_id"] == "u"] == [
         ("start", False),
@@ -120,7 +124,7 @@ def test_who_need_not_return_has_no_way_home_round_zones():
 def test_a_wait_that_is_too_long_to_be_told_is_named():
     far = replace(PROBLEM, targets=(PROBLEM.targets[0], replace(PROBLEM.targets[1], earliest=30.0)))
     with pytest.raises(OutOfRange, match=r"would wait .* s at 'b'"):
-        waypoint_file(flown(far)[0].routes[0], FlightChoices())
+        waypoint_file(flown(far)[0].routes[0].flights[0], FlightChoices())
 
 
 def test_csv_has_times_and_ways():
@@ -214,4 +218,6 @@ def test_what_uses_nothing_of_it_is_written_as_before():
     assert csv_table(plan).splitlines()[0].endswith(",step,delivered_1")
     assert "begin_time" not in geojson(plan)
     assert "Begin" not in printed_page(plan)
-    assert LOITER not in [item.command for item in items_of(waypoint_file(plan.routes[0], FlightChoices()))]
+    assert LOITER not in [
+        item.command for item in items_of(waypoint_file(plan.routes[0].flights[0], FlightChoices()))
+    ]

@@ -110,6 +110,24 @@ def test_no_plan_that_is_locked_or_changed_breaks_a_rule(audited, service):
     assert faults == [[], [], []]
 
 
+def test_bases_and_answers_with_reloads_are_accessible(audited, service):
+    page = audited
+    uav = {"id": "u", "x_s": 0, "y_s": 0, "speed": 2, "voyage": 60, "loadlist": [3], "full_load": [4]}
+    areas = [{"id": f"a{x}", "x": x, "y": 0, "level": 1, "loadlist": [3]} for x in (8, 14)]
+    depot = {"id": "depot", "x": 10, "y": 0, "stock": [9], "turnaround": 1}
+    open_problem(page, {"uavs": [uav], "targets": areas, "bases": [depot], "crs": "local"})
+    answer = show_answer(page, service.url)
+    assert len(answer["routes"][0]["stops"]) == 3
+    go(page, "answer")
+    faults = [violations(page)]
+    page.get_by_role("button", name="Change this plan").click()
+    faults.append(violations(page))
+    go(page, "problem")
+    page.locator("button[data-table=bases]").click()
+    faults.append(violations(page))
+    assert faults == [[], [], []]
+
+
 def test_the_dialog_keeps_the_focus_and_gives_it_back(page):
     ready(page)
     page.locator("#key").press("Enter")

@@ -152,13 +152,13 @@ class Maker:
 
 
 def meaning(problem):
-    """A problem without settings that are not set, its zones with the ids that they get."""
+    """A problem without settings that are not set, its zones and bases with the ids that they get."""
     given = {name: value for name, value in problem.items() if value != {}}
-    if "no_fly_zones" in given:
-        given["no_fly_zones"] = [
-            {"id": f"zone-{at}", **zone} for at, zone in enumerate(given["no_fly_zones"], 1)
-        ]
-    return given
+    for name, stem in (("no_fly_zones", "zone"), ("bases", "base")):
+        if name in given:
+            given[name] = [{"id": f"{stem}-{at}", **item} for at, item in enumerate(given[name], 1)]
+    # No bases are none, whether a file says so or not.
+    return {name: value for name, value in given.items() if name != "bases" or value}
 
 
 def test_whatever_goes_out_comes_back_the_same(openapi):
@@ -270,7 +270,7 @@ def csv(*rows, head=HEAD):
         ),
         (csv('uav,u1,0,0,1,10,,,"7'), "line 2: a quote is out of place"),
         (csv("uav,u1,0,0,1,10,,,,7,8"), "line 2: it has 11 cells for 10 columns"),
-        (csv("base,u1,0,0,1,10,,,,7"), "line 2: `kind` is neither uav, area nor problem: base"),
+        (csv("plane,u1,0,0,1,10,,,,7"), "line 2: `kind` is neither uav, area, base nor problem: plane"),
         (csv("uav,u1,0,0,1,,,,,7"), "UAV u1 has no `voyage`"),
         (
             "name,lat,lon\na,1,2\n",
@@ -458,16 +458,16 @@ def test_features_are_read_as_they_are_found(read):
                 feature(point(1, 2)),
                 feature({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, properties={"Name": "road"}),
             ),
-            "feature 2 (road) is a LineString: a UAV or an area is one point",
+            "feature 2 (road) is a LineString: a UAV, an area or a base is one point",
         ),
         (
             collection(feature({"type": "MultiPoint", "coordinates": [[0, 0], [1, 1]]})),
-            "feature 1 is a MultiPoint of 2 points: a UAV or an area is one point",
+            "feature 1 is a MultiPoint of 2 points: a UAV, an area or a base is one point",
         ),
         (collection(feature(point("1", "2"))), 'feature 1 has coordinates that are no numbers: ["1","2"]'),
         (
             collection(feature(point(1, 2), properties={"kind": "school"}, id="a")),
-            "feature 1 (a) has no property `kind` that is uav, area or zone",
+            "feature 1 (a) has no property `kind` that is uav, area, base or zone",
         ),
         (
             collection(feature(point(1, 2), properties={"level": "high"}, id="a")),
@@ -478,3 +478,33 @@ def test_features_are_read_as_they_are_found(read):
 )
 def test_a_map_that_cannot_be_read_is_refused_with_its_feature(read, content, message):
     assert read(content) == {"refused": message}
+
+
+def test_bases_go_out_and_come_back(openapi):
+    uav = {"id": "u", "x_s": 1, "y_s": 2, "speed": 3, "voyage": 40, "loadlist": [5, 6]}
+    problem = {
+        "uavs": [{**uav, "full_load": [7, 8], "bases": ["depot"]}],
+        "targets": [{"id": "a", "x": 1, "y": 1, "level": 1, "loadlist": [2, 0]}],
+        "bases": [
+            {"id": "depot", "x": 3, "y": 4, "stock": [9, 0], "turnaround": 0.5, "name": "=Depot"},
+            {"id": "spare", "x": 5, "y": 6},
+        ],
+        "crs": "local",
+    }
+    (found,) = run_module(AGAIN, {"openapi": openapi, "problems": [problem], "present": PRESENT})
+    for again in found:
+        assert again["problem"]["bases"] == problem["bases"]
+        assert again["problem"]["uavs"] == problem["uavs"]
+        assert again["notices"] == []
+
+
+def test_a_base_of_a_file_is_checked_and_without_a_stock_it_has_as_much_as_is_asked_for(openapi, read):
+    rows = "kind,id,x_s,y_s,speed,voyage,x,y,level,load_1,stock_1\n"
+    rows += "uav,u,0,0,1,10,,,,7,\narea,a,,,,,1,1,1,2,\nbase,d,,,,,3,4,,,\nbase,d,,,,,3,5,,,2\n"
+    found = read(rows.encode())
+    assert found["problem"]["bases"] == [
+        {"id": "d", "x": 3, "y": 4},
+        {"id": "d (2)", "x": 3, "y": 5, "stock": [2]},
+    ]
+    assert any("1 base has an id that stood before" in said for said in found["notices"])
+    assert "base d has no `y`" in read(rows.replace("3,4,", "3,,").encode())["refused"]

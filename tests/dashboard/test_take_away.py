@@ -75,7 +75,7 @@ def test_waypoints_of_one_uav_load_in_pymavlink(planned, service, tmp_path):
     assert {item.param1 for item in items if item.command == 183} == {5}
 
 
-@pytest.mark.parametrize("format", ["geojson", "csv", "html"])
+@pytest.mark.parametrize("format", ["geojson", "csv", "load-sheet", "html"])
 def test_documents_are_the_services(planned, service, format):
     page, answer = planned
 

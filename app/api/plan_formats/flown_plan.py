@@ -2,68 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+from app.api.plan_formats.flights import AT_PLACE, Flight, FlownLanding, FlownReload, FlownStop, Point, Points
 from app.domain.problem import UAV, Problem, Target
-from app.domain.surroundings import NoFlyZone
+from app.domain.surroundings import Base
 
 _OWN_PLAN = "evaluated"
 """In place of an algorithm, of a plan that a client has evaluated."""
-
-_AT_HOME = 1e-9
-"""Distances up to this are none: positions of the same place, written differently."""
-
-
-Points = tuple[tuple[float, float], ...]
-"""Places flown over in turn, both ends among them."""
-
-
-@dataclass(frozen=True, slots=True)
-class FlownStop:
-    """A visit: a stop of the answer, with its place.
-
-    Attributes
-    ----------
-    target
-        The rescue area as the problem has it.
-    step
-        Decision step, from 1.
-    arrival_time
-        In time units from now, or h.
-    distance
-        Of the leg to it.
-    delivered
-        Amounts unloaded, one a material.
-    range_left
-        On arrival, in distance units; what the UAV has flown before counts.
-    begin_time, departure_time
-        When the visit begins, which is after waiting, and when it has ended.
-    endurance_left
-        Time that the UAV may still be in the air, on departure; None where there is no limit.
-    path
-        The way to it.
-    ground_speed
-        Mean speed over ground on the way: in wind it is not the UAV's.
-    """
-
-    target: Target
-    step: int
-    arrival_time: float
-    distance: float
-    delivered: tuple[float, ...]
-    range_left: float
-    begin_time: float
-    departure_time: float
-    endurance_left: float | None
-    path: Points
-    ground_speed: float
-
-    @property
-    def waiting(self) -> float:
-        """Time from arrival until the visit begins."""
-        return self.begin_time - self.arrival_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,58 +24,36 @@ class FlownRoute:
         Its place in the swarm, from 0.
     uav
         As the problem has it.
-    stops
-        In order.
-    distance, return_distance
-        Of the legs to the stops, and of the leg home.
-    range_left
-        After the leg home, in distance units.
-    return_time
-        When it is home, in time units from now, or h; None where it need not return, and how long it would
-        fly is not known.
-    return_path
-        The way home; only the place where it ends its last visit where the way is not known.
-    zones
-        What it must not fly through.
+    distance
+        Of the legs to all stops.
+    flights
+        In order, at least one; those that do not move are among them.
     """
 
     number: int
     uav: UAV
-    stops: tuple[FlownStop, ...]
     distance: float
-    return_distance: float
-    range_left: float
-    return_time: float | None
-    return_path: Points
-    zones: tuple[NoFlyZone, ...]
+    flights: tuple[Flight, ...]
+
+    @property
+    def flown(self) -> tuple[Flight, ...]:
+        """The flights that move."""
+        return tuple(flight for flight in self.flights if flight.flies)
 
     @property
     def flies(self) -> bool:
-        """Whether it moves at all."""
-        return bool(self.stops) or self.return_distance > _AT_HOME
+        """Whether the UAV moves at all."""
+        return bool(self.flown)
 
     @property
-    def starts_at_home(self) -> bool:
-        """Whether it takes off from its starting point; otherwise it is on its way already."""
-        uav = self.uav
-        still = uav.dis <= _AT_HOME and uav.airborne == 0.0
-        return (
-            still and (uav.x_c, uav.y_c) == (uav.x_s, uav.y_s) and uav.home_location in (None, uav.location)
-        )
+    def stops(self) -> tuple[FlownStop, ...]:
+        """The visits of all flights."""
+        return tuple(stop for flight in self.flights for stop in flight.stops)
 
     @property
-    def waiting_on_ground(self) -> float:
-        """Time that it waits for its first visit before it takes off."""
-        return self.stops[0].waiting if self.stops and self.uav.begins_on_ground else 0.0
-
-    def arrives(self, number: int) -> float:
-        """When it is at a stop, counted from 0, if it takes off no sooner than it has to."""
-        return self.stops[number].arrival_time + (self.waiting_on_ground if number == 0 else 0.0)
-
-    def waiting_in_air(self, number: int) -> float:
-        """Time that it waits in the air at a stop, counted from 0."""
-        on_ground = self.waiting_on_ground if number == 0 else 0.0
-        return self.stops[number].waiting - on_ground
+    def landing(self) -> FlownLanding:
+        """The end of the last flight."""
+        return self.flights[-1].landing
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +63,14 @@ class UnmetNeed:
     target: Target
     remaining: tuple[float, ...]
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StockLeft:
+    """What a base has after the plan; None: as much as is asked for."""
+
+    base: Base
+    amounts: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +90,8 @@ class FlownPlan:
     in_world
         Whether the answer has what it only has where the problem uses fields of the world: times of visits
         and landings, ways.
+    stocks
+        What every base has left.
     """
 
     job_id: str
@@ -167,11 +103,17 @@ class FlownPlan:
     routes: tuple[FlownRoute, ...]
     unmet: tuple[UnmetNeed, ...]
     in_world: bool
+    stocks: tuple[StockLeft, ...]
 
     @property
     def flying(self) -> tuple[FlownRoute, ...]:
         """The routes of the UAVs that move."""
         return tuple(route for route in self.routes if route.flies)
+
+    @property
+    def has_bases(self) -> bool:
+        """Whether UAVs may land and fly again."""
+        return bool(self.problem.bases)
 
 
 def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
@@ -185,6 +127,8 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
         As ``POST /allocate`` gives it.
     """
     targets = {target.id: target for target in problem.targets}
+    bases = {base.id: base for base in problem.bases}
+    places = _Places(problem, targets, bases)
     return FlownPlan(
         job_id=answer["job_id"],
         algorithm=answer.get("algorithm", _OWN_PLAN),
@@ -193,7 +137,7 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
         distance=answer["distance"],
         problem=problem,
         routes=tuple(
-            _route(number, problem, uav, route, targets)
+            FlownRoute(number, uav, route["distance"], tuple(_flights(number, uav, route, places)))
             for number, (uav, route) in enumerate(zip(problem.uavs, answer["routes"], strict=True))
         ),
         unmet=tuple(
@@ -201,77 +145,151 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
             for each in answer["unmet"]
         ),
         in_world=answer.get("makespan") is not None,
+        stocks=tuple(
+            StockLeft(bases[each["base_id"]], None if each["stock"] is None else tuple(each["stock"]))
+            for each in answer.get("bases") or ()
+        ),
     )
 
 
-def _route(
-    number: int, problem: Problem, uav: UAV, route: Mapping[str, Any], targets: Mapping[str, Target]
-) -> FlownRoute:
-    flown, clock, here = uav.dis, uav.available_from, (uav.x_c, uav.y_c)
-    in_wind = problem.wind is not None and problem.wind.speed > 0.0
-    stops = []
-    for stop in route["stops"]:
-        flown += stop["distance"]
-        target = targets[stop["target_id"]]
-        there, arrival = (target.x, target.y), stop["arrival_time"]
-        # An answer to a problem without a world has the arrival alone: nobody waits there.
-        departure = stop.get("departure_time", arrival + target.service_time)
-        stops.append(
-            FlownStop(
-                target=target,
-                step=stop["step"],
-                arrival_time=arrival,
-                distance=stop["distance"],
-                delivered=tuple(stop["delivered"]),
-                range_left=stop.get("range_left", uav.voyage - flown),
-                begin_time=stop.get("begin_time", arrival),
-                departure_time=departure,
-                endurance_left=stop.get("endurance_left"),
-                path=_points(stop.get("path")) or (here, there),
-                ground_speed=stop["distance"] / (arrival - clock)
-                if in_wind and arrival > clock and stop["distance"] > 0.0
-                else uav.speed,
-            )
-        )
-        clock, here = departure, there
-    left = stops[-1].range_left if stops else uav.voyage - uav.dis
-    return FlownRoute(
+class _Places(NamedTuple):
+    problem: Problem
+    targets: Mapping[str, Target]
+    bases: Mapping[str, Base]
+
+    @property
+    def in_wind(self) -> bool:
+        wind = self.problem.wind
+        return wind is not None and wind.speed > 0.0
+
+
+class _Now(NamedTuple):
+    """A UAV between two legs: where, when, what it has flown, and what it has left of range and endurance."""
+
+    place: Point
+    clock: float
+    flown: float
+    range_left: float
+    endurance_left: float | None
+
+    def ground_speed(self, uav: UAV, arrival: float, distance: float, *, in_wind: bool) -> float:
+        known = in_wind and arrival > self.clock and distance > 0.0
+        return distance / (arrival - self.clock) if known else uav.speed
+
+    def air_length(self, uav: UAV, arrival: float, distance: float, *, in_wind: bool) -> float:
+        return (arrival - self.clock) * uav.speed if in_wind else distance
+
+    def aloft_until(self, arrival: float | None) -> float | None:
+        if self.endurance_left is None or arrival is None:
+            return None
+        return self.endurance_left - (arrival - self.clock)
+
+
+def _flights(route_number: int, uav: UAV, route: Mapping[str, Any], places: _Places) -> Iterator[Flight]:
+    """Cut the stops of a route where the UAV lands."""
+    aloft = None if uav.endurance is None else uav.endurance - uav.airborne
+    now = _Now((uav.x_c, uav.y_c), uav.available_from, uav.dis, uav.voyage - uav.dis, aloft)
+    number, origin, ready = 1, None, now.clock
+    loaded = load = uav.loadlist
+    aboard = load
+    visits: list[FlownStop] = []
+
+    def ended(landing: FlownLanding) -> Flight:
+        zones = places.problem.no_fly_zones
+        return Flight(route_number, uav, number, origin, ready, loaded, aboard, tuple(visits), landing, zones)
+
+    for at, stop in enumerate(route["stops"]):
+        if stop.get("kind") == "reload":
+            landing = _reload(uav, stop, at, now, places)
+            flight = ended(landing)
+            yield flight
+            number += flight.flies
+            origin, ready, loaded = landing.base, landing.departure_time, landing.loaded
+            load = tuple(had + more for had, more in zip(load, loaded, strict=True))
+            aboard, visits = load, []
+            now = _Now(landing.place, ready, 0.0, uav.voyage, uav.endurance)
+            continue
+        visits.append(_visit(uav, stop, at, now, places))
+        load = tuple(had - less for had, less in zip(load, stop["delivered"], strict=True))
+        last = visits[-1]
+        there = (last.target.x, last.target.y)
+        flown = now.flown + last.distance
+        now = _Now(there, last.departure_time, flown, last.range_left, last.endurance_left)
+    yield ended(_landing(uav, route, now, places))
+
+
+def _visit(uav: UAV, stop: Mapping[str, Any], number: int, now: _Now, places: _Places) -> FlownStop:
+    target, arrival, distance = places.targets[stop["target_id"]], stop["arrival_time"], stop["distance"]
+    # An answer to a problem without a world has the arrival alone: nobody waits there.
+    return FlownStop(
+        target=target,
         number=number,
-        uav=uav,
-        stops=tuple(stops),
-        distance=route["distance"],
-        return_distance=route["return_distance"],
-        **_way_home(problem, uav, route, clock, here, left, in_wind=in_wind),
-        zones=problem.no_fly_zones,
+        step=stop["step"],
+        arrival_time=arrival,
+        distance=distance,
+        delivered=tuple(stop["delivered"]),
+        range_left=stop.get("range_left", uav.voyage - (now.flown + distance)),
+        begin_time=stop.get("begin_time", arrival),
+        departure_time=stop.get("departure_time", arrival + target.service_time),
+        endurance_left=stop.get("endurance_left"),
+        path=_points(stop.get("path")) or (now.place, (target.x, target.y)),
+        ground_speed=now.ground_speed(uav, arrival, distance, in_wind=places.in_wind),
     )
 
 
-def _way_home(
-    problem: Problem,
-    uav: UAV,
-    route: Mapping[str, Any],
-    clock: float,
-    here: tuple[float, float],
-    left: float,
-    *,
-    in_wind: bool,
-) -> dict[str, Any]:
-    """Return the fields that are about the leg home, from when and where it begins with so much range."""
-    distance, home = route["return_distance"], (uav.x_s, uav.y_s)
-    landing = route.get("landing")
+def _reload(uav: UAV, stop: Mapping[str, Any], number: int, now: _Now, places: _Places) -> FlownReload:
+    base, arrival, distance = places.bases[stop["base_id"]], stop["arrival_time"], stop["distance"]
+    in_wind = places.in_wind
+    return FlownReload(
+        base=base,
+        place=(base.x, base.y),
+        time=arrival,
+        distance=distance,
+        range_left=now.range_left - now.air_length(uav, arrival, distance, in_wind=in_wind),
+        endurance_left=now.aloft_until(arrival),
+        path=_points(stop["path"]) or (now.place, (base.x, base.y)),
+        ground_speed=now.ground_speed(uav, arrival, distance, in_wind=in_wind),
+        number=number,
+        step=stop["step"],
+        loaded=tuple(stop["loaded"]),
+        departure_time=stop["departure_time"],
+    )
+
+
+def _landing(uav: UAV, route: Mapping[str, Any], now: _Now, places: _Places) -> FlownLanding:
+    """Return the end of a route, from when and where the leg to it begins."""
+    problem, in_wind = places.problem, places.in_wind
+    distance, landing = route["return_distance"], route.get("landing")
     if landing is None or not problem.objective.return_to_base:
-        # Zones, wind and matrices make another way of it, or another time, which the plan does not have.
-        known = not (problem.no_fly_zones or in_wind or problem.matrices) or distance <= _AT_HOME
-        return {
-            "range_left": left - distance,
-            "return_time": clock + distance / uav.speed if known else None,
-            "return_path": (here, home) if known else (here,),
-        }
-    return {
-        "range_left": left - ((landing["time"] - clock) * uav.speed if in_wind else distance),
-        "return_time": landing["time"],
-        "return_path": _points(landing["path"]) or (here, home),
-    }
+        # Zones, wind and matrices make another way of it, or another time, which the plan does not have;
+        # nor does it say to which base the leg leads.
+        elsewhere = problem.no_fly_zones or in_wind or problem.matrices or problem.bases
+        known = not elsewhere or distance <= AT_PLACE
+        home = (uav.x_s, uav.y_s)
+        time = now.clock + distance / uav.speed if known else None
+        return FlownLanding(
+            base=None,
+            place=home,
+            time=time,
+            distance=distance,
+            range_left=now.range_left - distance,
+            endurance_left=now.aloft_until(time),
+            path=(now.place, home) if known else (now.place,),
+            ground_speed=uav.speed,
+        )
+    base_id, time = landing.get("base_id"), landing["time"]
+    base = None if base_id is None else places.bases[base_id]
+    place = (uav.x_s, uav.y_s) if base is None else (base.x, base.y)
+    return FlownLanding(
+        base=base,
+        place=place,
+        time=time,
+        distance=distance,
+        range_left=now.range_left - now.air_length(uav, time, distance, in_wind=in_wind),
+        endurance_left=now.aloft_until(time),
+        path=_points(landing["path"]) or (now.place, place),
+        ground_speed=now.ground_speed(uav, time, distance, in_wind=in_wind),
+    )
 
 
 def _points(path: Sequence[Sequence[float]] | None) -> Points:

@@ -1,20 +1,21 @@
-"""From a UAV's route to MAVLink mission items, which both of QGroundControl's formats hold.
+"""From a flight to MAVLink mission items, which both of QGroundControl's formats hold.
 
-A mission is: take off where it starts at home, fly at the UAV's speed, for every stop fly there, deliver and
-stay for the service time, then go home or land. Where the way is no straight line it flies over its corners;
-where it is there before the visit begins it loiters; in wind every leg has its speed over ground. Commands
-and frames are those of MAVLink's common message set (``MAV_CMD``, ``MAV_FRAME``).
+A mission is: take off where it starts at home or at a base, fly at the UAV's speed, for every stop fly there,
+deliver and stay for the service time, then go home or land. A flight that ends elsewhere than it has begun
+flies there and lands: a return leads to where the UAV was launched. Where the way is no straight line it
+flies over its corners; where it is there before the visit begins it loiters; in wind every leg has its speed
+over ground. Commands and frames are those of MAVLink's common message set (``MAV_CMD``, ``MAV_FRAME``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 from app.api.plan_formats.errors import OutOfRange
-from app.api.plan_formats.flown_plan import FlownRoute, FlownStop, Points
+from app.api.plan_formats.flights import Flight, FlownReload, FlownStop, Points
 from app.api.problem_details import FieldError
 from app.domain.problem import TOLERANCE
 
@@ -66,7 +67,7 @@ class Delivery(StrEnum):
 
 
 class Ending(StrEnum):
-    """What comes after the last stop."""
+    """What comes after the last stop of a UAV; flights before its last one end at their base."""
 
     RETURN = "return"
     LAND = "land"
@@ -135,50 +136,65 @@ class MissionItem:
     place: tuple[float, float, float] | None = None
 
 
-def mission(route: FlownRoute, choices: FlightChoices) -> tuple[MissionItem, ...]:
-    """Turn a route of a ``wgs84`` problem into mission items, without the home position.
+def mission(flight: Flight, choices: FlightChoices) -> tuple[MissionItem, ...]:
+    """Turn a flight of a ``wgs84`` problem into mission items, without the home position.
 
     Raises
     ------
     OutOfRange
         With every number that is beyond what the format, an autopilot or the UAV can hold.
     """
-    errors = list(_violations(route, choices))
-    items = tuple(_items(route, choices))
+    errors = list(_violations(flight, choices))
+    items = tuple(_items(flight, choices))
     if len(items) >= MAX_ITEMS:
         errors.append(
-            FieldError(pointer=_at(route), detail=f"{len(items)} mission items, at most {MAX_ITEMS}")
+            FieldError(pointer=_at(flight), detail=f"{len(items)} mission items, at most {MAX_ITEMS}")
         )
     if errors:
         raise OutOfRange(errors)
     return items
 
 
-def speed_m_s(route: FlownRoute) -> float:
+def speed_m_s(flight: Flight) -> float:
     """Return a UAV's speed; the problem's is in km/h."""
-    return route.uav.speed / 3.6
+    return flight.uav.speed / 3.6
 
 
-def _items(route: FlownRoute, choices: FlightChoices) -> Iterator[MissionItem]:
-    uav = route.uav
-    if route.starts_at_home:
-        yield _placed(Command.TAKEOFF, choices, uav.x_s, uav.y_s, choices.altitude_m)
-    told = speed_m_s(route)
+def _ending(flight: Flight, choices: FlightChoices) -> Ending:
+    return Ending.RETURN if isinstance(flight.landing, FlownReload) else choices.end
+
+
+def _items(flight: Flight, choices: FlightChoices) -> Iterator[MissionItem]:
+    end = _ending(flight, choices)
+    if flight.takes_off:
+        yield _placed(Command.TAKEOFF, choices, *flight.launch, choices.altitude_m)
+    told = speed_m_s(flight)
     yield _speed(told)
-    for number, stop in enumerate(route.stops):
+    for number, stop in enumerate(flight.stops):
         speed = stop.ground_speed / 3.6
-        if abs(speed - told) > _SAME_SPEED * told:
+        if _differs(speed, told):
             told = speed
             yield _speed(told)
         yield from _corners(stop.path, choices)
-        last = number == len(route.stops) - 1
-        yield from _visit(stop, choices, _seconds(route.waiting_in_air(number)), last=last)
-    if choices.end is Ending.RETURN:
-        yield from _corners(route.return_path, choices)
+        lands = number == len(flight.stops) - 1 and end is Ending.LAND
+        yield from _visit(stop, choices, _seconds(flight.waiting_in_air(number)), lands=lands)
+    if end is Ending.RETURN and flight.returns_to_launch:
+        yield from _corners(flight.landing.path, choices)
         yield MissionItem(Command.RETURN_TO_LAUNCH, Frame.MISSION, (0.0, 0.0, 0.0, 0.0))
-    elif not (route.stops and choices.delivery is Delivery.LAND):
-        x, y = (route.stops[-1].target.x, route.stops[-1].target.y) if route.stops else (uav.x_c, uav.y_c)
+    elif end is Ending.RETURN:
+        speed = flight.landing.ground_speed / 3.6
+        if _differs(speed, told):
+            yield _speed(speed)
+        yield from _corners(flight.landing.path, choices)
+        yield _placed(Command.WAYPOINT, choices, *flight.landing.place, choices.altitude_m)
+        yield _placed(Command.LAND, choices, *flight.landing.place, 0.0)
+    elif not (flight.stops and choices.delivery is Delivery.LAND):
+        x, y = (flight.stops[-1].target.x, flight.stops[-1].target.y) if flight.stops else flight.place
         yield _placed(Command.LAND, choices, x, y, 0.0)
+
+
+def _differs(speed: float, told: float) -> bool:
+    return abs(speed - told) > _SAME_SPEED * told
 
 
 def _speed(speed: float) -> MissionItem:
@@ -196,7 +212,9 @@ def _corners(path: Points, choices: FlightChoices) -> Iterator[MissionItem]:
         yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
 
 
-def _visit(stop: FlownStop, choices: FlightChoices, waiting_s: float, *, last: bool) -> Iterator[MissionItem]:
+def _visit(
+    stop: FlownStop, choices: FlightChoices, waiting_s: float, *, lands: bool
+) -> Iterator[MissionItem]:
     x, y, hold_s = stop.target.x, stop.target.y, _seconds(stop.target.service_time)
     stay = MissionItem(Command.DELAY, Frame.MISSION, (hold_s, -1.0, -1.0, -1.0))
     yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
@@ -207,7 +225,7 @@ def _visit(stop: FlownStop, choices: FlightChoices, waiting_s: float, *, last: b
             yield _placed(Command.LAND, choices, x, y, 0.0)
             if hold_s > 0:
                 yield stay
-            if not (last and choices.end is Ending.LAND):
+            if not lands:
                 yield _placed(Command.TAKEOFF, choices, x, y, choices.altitude_m)
             return
         case Delivery.PAYLOAD_PLACE:
@@ -237,41 +255,54 @@ def _placed(
     return MissionItem(command, choices.frame, (first, 0.0, 0.0, heading), (x, y, altitude_m))
 
 
-def _violations(route: FlownRoute, choices: FlightChoices) -> Iterator[FieldError]:
-    at = _at(route)
-    uav = route.uav
-    yield from _place_violations(f"{at}/start", uav.x_s, uav.y_s)
-    yield from _place_violations(f"{at}/position", uav.x_c, uav.y_c)
-    for number, stop in enumerate(route.stops):
-        yield from _place_violations(f"{at}/stops/{number}", stop.target.x, stop.target.y)
+def _violations(flight: Flight, choices: FlightChoices) -> Iterator[FieldError]:
+    at = _at(flight)
+    uav, landing = flight.uav, flight.landing
+    yield from _place_violations(f"{at}/start", *flight.launch)
+    yield from _place_violations(f"{at}/position", *flight.place)
+    for number, stop in enumerate(flight.stops):
+        at_stop = f"{at}/stops/{stop.number}"
+        yield from _place_violations(at_stop, stop.target.x, stop.target.y)
         for name, does, hold_s in (
             ("service_time", "stay", _seconds(stop.target.service_time)),
-            ("begin_time", "wait", _seconds(route.waiting_in_air(number))),
+            ("begin_time", "wait", _seconds(flight.waiting_in_air(number))),
         ):
             if hold_s > MAX_HOLD_S:
                 yield FieldError(
-                    pointer=f"{at}/stops/{number}/{name}",
+                    pointer=f"{at_stop}/{name}",
                     detail=f"{uav.id!r} would {does} {hold_s:g} s at {stop.target.id!r}, "
                     f"at most {MAX_HOLD_S:g} s can be told",
                 )
         if stop.ground_speed != uav.speed:
-            yield from _speed_violations(f"{at}/stops/{number}/speed", route, stop.ground_speed / 3.6)
-        yield from _range_violations(f"{at}/stops/{number}", route, f"at {stop.target.id!r}", stop.range_left)
-    if choices.end is Ending.RETURN:
-        if route.return_time is None:
+            yield from _speed_violations(f"{at_stop}/speed", flight, stop.ground_speed / 3.6)
+        yield from _left_violations(
+            at_stop, flight, f"at {stop.target.id!r}", stop.range_left, stop.endurance_left
+        )
+    if _ending(flight, choices) is Ending.RETURN:
+        if landing.time is None:
             detail = (
                 f"{uav.id!r} need not return, and the plan has no way home (end=land stays at the last stop)"
             )
             yield FieldError(pointer=f"{at}/landing", detail=detail)
-        yield from _range_violations(at, route, "at home (end=land stays at the last stop)", route.range_left)
-    yield from _speed_violations(f"{at}/speed", route, speed_m_s(route))
+        at_landing, advice = at, " (end=land stays at the last stop)"
+        if isinstance(landing, FlownReload):
+            at_landing, advice = f"{at}/stops/{landing.number}", ""
+        where = f"at home{advice}" if landing.base is None else f"at base {landing.base.id!r}{advice}"
+        if not flight.returns_to_launch:
+            yield from _place_violations(f"{at_landing}/landing", *landing.place)
+            if landing.ground_speed != uav.speed:
+                yield from _speed_violations(f"{at_landing}/speed", flight, landing.ground_speed / 3.6)
+        yield from _left_violations(at_landing, flight, where, landing.range_left, landing.endurance_left)
+    yield from _speed_violations(f"{at}/speed", flight, speed_m_s(flight))
     yield from _choice_violations(choices)
 
 
-def _speed_violations(at: str, route: FlownRoute, speed: float) -> Iterator[FieldError]:
+def _speed_violations(at: str, flight: Flight, speed: float) -> Iterator[FieldError]:
     if not MIN_SPEED_M_S <= speed <= MAX_SPEED_M_S:
         limits = f"{MIN_SPEED_M_S:g}..{MAX_SPEED_M_S:g}"
-        yield FieldError(pointer=at, detail=f"{route.uav.id!r} flies {speed:g} m/s, which is not in {limits}")
+        yield FieldError(
+            pointer=at, detail=f"{flight.uav.id!r} flies {speed:g} m/s, which is not in {limits}"
+        )
 
 
 def _choice_violations(choices: FlightChoices) -> Iterator[FieldError]:
@@ -296,12 +327,19 @@ def _place_violations(at: str, x: float, y: float) -> Iterator[FieldError]:
             )
 
 
-def _range_violations(at: str, route: FlownRoute, where: str, left: float) -> Sequence[FieldError]:
-    if left >= -TOLERANCE * max(1.0, route.uav.voyage):
-        return ()
-    detail = f"{route.uav.id!r} would be {-left:g} km beyond its range of {route.uav.voyage:g} km {where}"
-    return (FieldError(pointer=f"{at}/range_left", detail=detail),)
+def _left_violations(
+    at: str, flight: Flight, where: str, range_left: float, endurance_left: float | None
+) -> Iterator[FieldError]:
+    """Compare what is left of the range and of the time in the air of this flight with none."""
+    uav = flight.uav
+    for name, left, whole, called, unit in (
+        ("range_left", range_left, uav.voyage, "range", "km"),
+        ("endurance_left", endurance_left, uav.endurance, "endurance", "h"),
+    ):
+        if left is not None and whole is not None and left < -TOLERANCE * max(1.0, whole):
+            detail = f"{uav.id!r} would be {-left:g} {unit} beyond its {called} of {whole:g} {unit} {where}"
+            yield FieldError(pointer=f"{at}/{name}", detail=detail)
 
 
-def _at(route: FlownRoute) -> str:
-    return f"/routes/{route.number}"
+def _at(flight: Flight) -> str:
+    return f"/routes/{flight.route}"

@@ -9,10 +9,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, FlownStop
+from app.api.plan_formats.flights import Flight, FlownReload
+from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
+from app.api.plan_formats.printed_loads import load_tables
+from app.api.plan_formats.printed_text import (
+    amounts_text,
+    called,
+    duration_text,
+    position_text,
+    time_text,
+    unit_text,
+)
 from app.domain.geometry import unrolled
-from app.domain.problem import UAV, Target
-from app.domain.surroundings import NoFlyZone
+from app.domain.problem import Target
+from app.domain.surroundings import Base
 
 _WIDTH, _HEIGHT, _MARGIN = 720.0, 440.0, 24.0
 _COLOURS = ("#0b6e99", "#b4451f", "#3d7a2a", "#7a3f9d", "#a17a00", "#00736b", "#a8325e", "#4a5568")
@@ -38,24 +48,15 @@ def printed_page(plan: FlownPlan) -> str:
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
             f"<h1>{escape(title)}</h1>",
             f"<p>{escape(plan.algorithm)}: reward {plan.reward:.4g}, satisfaction {plan.satisfaction:.4g}, "
-            f"distance {plan.distance:.5g}{_unit(plan, ' km')}. "
+            f"distance {plan.distance:.5g}{unit_text(plan, ' km')}. "
             f"{len(plan.flying)} of {len(plan.routes)} UAVs fly.{_world(plan)}</p>",
             _map(plan),
             *(_card(plan, route) for route in plan.flying),
+            load_tables(plan) if plan.has_bases else "",
             _unmet(plan),
             "</body></html>\n",
         ]
     )
-
-
-def clock(hours: float) -> str:
-    """Write a time in h as hours and minutes, rounded to the minute."""
-    minutes = round(hours * 60)
-    return f"{minutes // 60}:{minutes % 60:02d}"
-
-
-def _unit(plan: FlownPlan, unit: str) -> str:
-    return unit if plan.problem.crs == "wgs84" else ""
 
 
 def _world(plan: FlownPlan) -> str:
@@ -63,51 +64,27 @@ def _world(plan: FlownPlan) -> str:
     wind, zones = plan.problem.wind, plan.problem.no_fly_zones
     said = ""
     if wind is not None:
-        said += f" Wind: {wind.speed:g}{_unit(plan, ' km/h')} towards {wind.towards:g}°."
+        said += f" Wind: {wind.speed:g}{unit_text(plan, ' km/h')} towards {wind.towards:g}°."
     if zones:
-        said += f" No-fly zones: {', '.join(escape(_called(zone)) for zone in zones)}."
+        said += f" No-fly zones: {', '.join(escape(called(zone)) for zone in zones)}."
     return said
-
-
-def _called(item: UAV | Target | NoFlyZone) -> str:
-    """Name an item for people: names need not be unique, so the id is there too."""
-    return item.id if item.name in (None, item.id) else f"{item.name} ({item.id})"
-
-
-def _time(plan: FlownPlan, time: float | None) -> str:
-    if time is None:
-        return "–"
-    return f"+{clock(time)} h" if plan.problem.crs == "wgs84" else f"{time:.4g}"
-
-
-def _amounts(amounts: tuple[float, ...]) -> str:
-    return " · ".join(f"{amount:g}" for amount in amounts)
 
 
 def _card(plan: FlownPlan, route: FlownRoute) -> str:
     uav = route.uav
-    rows = [
-        f"<tr><td>{order}</td><td>{escape(_called(stop.target))}{_waiting(plan, route, order - 1)}</td>"
-        f"<td>{_position(plan, stop.target.x, stop.target.y)}</td>"
-        f'<td class="n">{_time(plan, route.arrives(order - 1))}</td>{_times(plan, stop)}'
-        f'<td class="n">{stop.distance:.4g}</td>'
-        f'<td class="n">{_amounts(stop.delivered)}</td><td class="n">{stop.range_left:.4g}</td>'
-        '<td class="done">☐</td></tr>'
-        for order, stop in enumerate(route.stops, 1)
-    ]
-    rows.append(
-        f"<tr><td>{len(route.stops) + 1}</td><td>home</td><td>{_position(plan, uav.x_s, uav.y_s)}</td>"
-        f'<td class="n">{_time(plan, route.return_time)}</td>{_times(plan, None)}'
-        f'<td class="n">{route.return_distance:.4g}</td>'
-        f'<td class="n"></td><td class="n">{route.range_left:.4g}</td><td class="done">☐</td></tr>'
-    )
-    km = _unit(plan, ", km")
+    rows: list[str] = []
+    for flight in route.flights:
+        if flight.number > 1 and flight.flies:
+            rows.append(_flight(plan, flight))
+        rows += [_visit(plan, flight, number) for number in range(len(flight.stops))]
+        rows.append(_landing(plan, flight, len(route.stops) + len(route.flights)))
+    km = unit_text(plan, ", km")
     times = '<th class="n">Begin</th><th class="n">End</th>' if plan.in_world else ""
     return (
         f'<section><h2><span class="key" style="background:{_colour(route)}"></span>'
-        f"{escape(_called(uav))}</h2>"
-        f"<p>Load {_amounts(uav.loadlist)}; range left {uav.voyage - uav.dis:g}{_unit(plan, ' km')}; "
-        f"speed {uav.speed:g}{_unit(plan, ' km/h')}{_take_off(plan, route)}</p>"
+        f"{escape(called(uav))}</h2>"
+        f"<p>Load {amounts_text(uav.loadlist)}; range left {uav.voyage - uav.dis:g}{unit_text(plan, ' km')}; "
+        f"speed {uav.speed:g}{unit_text(plan, ' km/h')}{_take_off(plan, route.flights[0])}</p>"
         "<table><thead><tr><th>#</th><th>Where</th><th>Position</th>"
         f'<th class="n">Arrival</th>{times}<th class="n">Leg{km}</th><th class="n">Unload</th>'
         f'<th class="n">Range left{km}</th><th>Done</th></tr></thead>'
@@ -115,45 +92,69 @@ def _card(plan: FlownPlan, route: FlownRoute) -> str:
     )
 
 
-def _times(plan: FlownPlan, stop: FlownStop | None) -> str:
-    """Write when a visit begins and has ended, where visits have such times."""
+def _flight(plan: FlownPlan, flight: Flight) -> str:
+    columns = 8 + 2 * plan.in_world
+    return (
+        f'<tr><th colspan="{columns}">Flight {flight.number}, with {amounts_text(flight.aboard)}'
+        f"{_take_off(plan, flight)}</th></tr>"
+    )
+
+
+def _visit(plan: FlownPlan, flight: Flight, number: int) -> str:
+    stop = flight.stops[number]
+    waits = flight.waiting_in_air(number)
+    waiting = f"<br>waits {duration_text(plan, waits)} in the air" if waits > 0.0 else ""
+    return (
+        f"<tr><td>{stop.number + 1}</td><td>{escape(called(stop.target))}{waiting}</td>"
+        f"<td>{position_text(plan, stop.target.x, stop.target.y)}</td>"
+        f'<td class="n">{time_text(plan, flight.arrives(number))}</td>'
+        f"{_times(plan, stop.begin_time, stop.departure_time)}"
+        f'<td class="n">{stop.distance:.4g}</td>'
+        f'<td class="n">{amounts_text(stop.delivered)}</td><td class="n">{stop.range_left:.4g}</td>'
+        '<td class="done">☐</td></tr>'
+    )
+
+
+def _landing(plan: FlownPlan, flight: Flight, last: int) -> str:
+    """Write the row of a landing, which is the `last` one of the card where it is for good."""
+    landing = flight.landing
+    order, amounts, departure = last, "", None
+    where = "home" if landing.base is None else f"home: base {escape(called(landing.base))}"
+    if isinstance(landing, FlownReload):
+        order, departure = landing.number + 1, landing.departure_time
+        where = f"reload: base {escape(called(landing.base))}"
+        amounts = f"load {amounts_text(landing.loaded)}"
+    return (
+        f"<tr><td>{order}</td><td>{where}</td><td>{position_text(plan, *landing.place)}</td>"
+        f'<td class="n">{time_text(plan, landing.time)}</td>{_times(plan, None, departure)}'
+        f'<td class="n">{landing.distance:.4g}</td>'
+        f'<td class="n">{amounts}</td><td class="n">{landing.range_left:.4g}</td><td class="done">☐</td></tr>'
+    )
+
+
+def _times(plan: FlownPlan, *times: float | None) -> str:
+    """Write when a stop begins and has ended, where stops have such times."""
     if not plan.in_world:
         return ""
-    times = ("", "") if stop is None else (_time(plan, stop.begin_time), _time(plan, stop.departure_time))
-    return "".join(f'<td class="n">{time}</td>' for time in times)
+    texts = ("" if time is None else time_text(plan, time) for time in times)
+    return "".join(f'<td class="n">{text}</td>' for text in texts)
 
 
-def _waiting(plan: FlownPlan, route: FlownRoute, number: int) -> str:
-    waits = route.waiting_in_air(number)
-    return f"<br>waits {_duration(plan, waits)} in the air" if waits > 0.0 else ""
-
-
-def _take_off(plan: FlownPlan, route: FlownRoute) -> str:
+def _take_off(plan: FlownPlan, flight: Flight) -> str:
     """Say when a UAV takes off, where that is not at once."""
-    waits = route.waiting_on_ground
-    takes_off = route.uav.available_from + waits
-    if not route.starts_at_home or takes_off <= 0.0:
+    waits, takes_off = flight.waiting_on_ground, flight.take_off_time
+    if takes_off is None or takes_off <= 0.0:
         return ""
-    why = f" (waits {_duration(plan, waits)} on the ground)" if waits > 0.0 else ""
-    return f"; takes off {_time(plan, takes_off)}{why}"
-
-
-def _duration(plan: FlownPlan, time: float) -> str:
-    return _time(plan, time).removeprefix("+")
-
-
-def _position(plan: FlownPlan, x: float, y: float) -> str:
-    if plan.problem.crs != "wgs84":
-        return f"{x:g}, {y:g}"
-    return f"{abs(y):.5f}° {'N' if y >= 0 else 'S'}, {abs(x):.5f}° {'E' if x >= 0 else 'W'}"
+    why = f" (waits {duration_text(plan, waits)} on the ground)" if waits > 0.0 else ""
+    return f"; takes off {time_text(plan, takes_off)}{why}"
 
 
 def _unmet(plan: FlownPlan) -> str:
     if not plan.unmet:
         return "<section><h2>Unmet needs</h2><p>None: every area gets all it needs.</p></section>"
     rows = "".join(
-        f'<tr><td>{escape(_called(each.target))}</td><td class="n">{each.target.level:g}</td>'
-        f'<td class="n">{_amounts(each.remaining)}</td><td class="why">{escape(each.reason)}</td></tr>'
+        f'<tr><td>{escape(called(each.target))}</td><td class="n">{each.target.level:g}</td>'
+        f'<td class="n">{amounts_text(each.remaining)}</td><td class="why">{escape(each.reason)}</td></tr>'
         for each in plan.unmet
     )
     return (
@@ -176,14 +177,15 @@ def _map(plan: FlownPlan) -> str:
 
 def _shapes(plan: FlownPlan) -> Iterator[str]:
     problem = plan.problem
-    given = [x for u in problem.uavs for x in (u.x_s, u.x_c)] + [t.x for t in problem.targets]
+    places: list[Target | Base] = [*problem.targets, *problem.bases]
+    given = [x for u in problem.uavs for x in (u.x_s, u.x_c)] + [each.x for each in places]
     corners = [corner for zone in problem.no_fly_zones for corner in zone.polygon]
     given += [x for x, _ in corners]
     # One map without the jump at the antimeridian; places are drawn where it has them.
     xs = unrolled(problem.crs, np.array(given))
     on_map = dict(zip(given, xs.tolist(), strict=True))
     around = 360.0 if problem.crs == "wgs84" else math.inf
-    ys = [y for u in problem.uavs for y in (u.y_s, u.y_c)] + [t.y for t in problem.targets]
+    ys = [y for u in problem.uavs for y in (u.y_s, u.y_c)] + [each.y for each in places]
     ys += [y for _, y in corners]
     west, south = float(xs.min()), min(ys)
     span_x, span_y = float(xs.max()) - west or 1.0, max(ys) - south or 1.0
@@ -201,21 +203,25 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
         points = " ".join("{:.1f},{:.1f}".format(*at(x, y)) for x, y in zone.polygon)
         yield (
             f'<polygon points="{points}" fill="#c22" fill-opacity="0.15" stroke="#c22" '
-            f'stroke-dasharray="4 2"><title>{escape(_called(zone))}</title></polygon>'
+            f'stroke-dasharray="4 2"><title>{escape(called(zone))}</title></polygon>'
         )
     for route in plan.flying:
-        uav = route.uav
-        places = [(uav.x_c, uav.y_c)]
-        for stop in route.stops:
-            places += stop.path[1:]
-        places += route.return_path[1:]
-        for line in _lines([(on_map[x], y) for x, y in places], around):
+        way = [route.flights[0].place]
+        for flight in route.flights:
+            for stop in flight.stops:
+                way += stop.path[1:]
+            way += flight.landing.path[1:]
+        for line in _lines([(on_map[x], y) for x, y in way], around):
             points = " ".join("{:.1f},{:.1f}".format(*place(x, y)) for x, y in line)
             yield f'<polyline points="{points}" fill="none" stroke="{_colour(route)}" stroke-width="1.5"/>'
     for target in problem.targets:
         x, y = at(target.x, target.y)
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#fff" stroke="#111"/>'
-        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(_called(target))}</text>'
+        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(called(target))}</text>'
+    for base in problem.bases:
+        x, y = at(base.x, base.y)
+        yield f'<path d="M{x - 5:.1f} {y - 5:.1f}h10v10h-10z" fill="#fff" stroke="#111" stroke-width="2"/>'
+        yield f'<text x="{x + 8:.1f}" y="{y + 3:.1f}">{escape(called(base))}</text>'
     for x_s, y_s in {(uav.x_s, uav.y_s) for uav in problem.uavs}:
         x, y = at(x_s, y_s)
         yield f'<path d="M{x:.1f} {y - 6:.1f}l5 9h-10z" fill="#111"/>'

@@ -1,4 +1,4 @@
-"""Flight files for one UAV: QGroundControl's ``.plan`` (JSON) and the older ``QGC WPL 110`` (tabs)."""
+"""Flight files, one a flight: QGroundControl's ``.plan`` (JSON) and the older ``QGC WPL 110`` (tabs)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import re
 from typing import Any
 
-from app.api.plan_formats.flown_plan import FlownRoute
+from app.api.plan_formats.flights import Flight, FlownReload
 from app.api.plan_formats.mission import (
     AltitudeReference,
     Command,
@@ -25,7 +25,7 @@ _ALTITUDE_MODE = {AltitudeReference.HOME: 1, AltitudeReference.TERRAIN: 4}
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 
-def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
+def plan_file(flight: Flight, choices: FlightChoices) -> str:
     """Write a ``.plan``, version 1, with a mission of version 2 of simple items; no rally points.
 
     No-fly zones are polygons of its fence that must not be entered. What a mission cannot say is in
@@ -36,14 +36,15 @@ def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
     OutOfRange
         As :func:`~app.api.plan_formats.mission.mission` does.
     """
-    items = mission(route, choices)
+    items = mission(flight, choices)
     altitude_mode = _ALTITUDE_MODE[choices.altitude_reference]
-    speed = speed_m_s(route)
+    speed = speed_m_s(flight)
+    longitude, latitude = flight.launch
     content: dict[str, Any] = {
         "fileType": "Plan",
         "version": 1,
         "groundStation": "QGroundControl",
-        "geoFence": {"version": 2, "circles": [], "polygons": [_kept_out(zone) for zone in route.zones]},
+        "geoFence": {"version": 2, "circles": [], "polygons": [_kept_out(zone) for zone in flight.zones]},
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
             "version": 2,
@@ -52,11 +53,11 @@ def plan_file(route: FlownRoute, choices: FlightChoices) -> str:
             "globalPlanAltitudeMode": altitude_mode,
             "cruiseSpeed": speed,
             "hoverSpeed": speed,
-            "plannedHomePosition": [route.uav.y_s, route.uav.x_s, 0],
+            "plannedHomePosition": [latitude, longitude, 0],
             "items": [_simple_item(number, item, altitude_mode) for number, item in enumerate(items, 1)],
         },
     }
-    notes = _notes(route)
+    notes = _notes(flight)
     if notes:
         content["notes"] = notes
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
@@ -66,17 +67,19 @@ def _kept_out(zone: NoFlyZone) -> dict[str, Any]:
     return {"version": 1, "inclusion": False, "polygon": [[y, x] for x, y in zone.polygon]}
 
 
-def _notes(route: FlownRoute) -> list[str]:
-    """Say when the UAV takes off, where that is not at once."""
-    wait = route.waiting_on_ground
-    takes_off = route.uav.available_from + wait
-    if not route.starts_at_home or takes_off <= 0.0:
-        return []
-    why = "" if wait <= 0.0 else f", so that it waits for {route.stops[0].target.id!r} on the ground"
-    return [f"{route.uav.id!r} takes off {takes_off:g} h from the plan's begin{why}"]
+def _notes(flight: Flight) -> list[str]:
+    """Say when the UAV takes off, where that is not at once, and where it lands to reload."""
+    uav, wait, takes_off = flight.uav, flight.waiting_on_ground, flight.take_off_time
+    notes = []
+    if takes_off is not None and takes_off > 0.0:
+        why = "" if wait <= 0.0 else f", so that it waits for {flight.stops[0].target.id!r} on the ground"
+        notes.append(f"{uav.id!r} takes off {takes_off:g} h from the plan's begin{why}")
+    if isinstance(flight.landing, FlownReload):
+        notes.append(f"flight {flight.number} of {uav.id!r} ends at base {flight.landing.base.id!r}: reload")
+    return notes
 
 
-def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
+def waypoint_file(flight: Flight, choices: FlightChoices) -> str:
     """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots
     expect: in the global frame, since no other altitude is measured from anything else.
 
@@ -85,11 +88,9 @@ def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
     OutOfRange
         As :func:`~app.api.plan_formats.mission.mission` does.
     """
-    home = MissionItem(
-        Command.WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), (route.uav.x_s, route.uav.y_s, 0.0)
-    )
+    home = MissionItem(Command.WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), (*flight.launch, 0.0))
     lines = ["QGC WPL 110"]
-    for number, item in enumerate((home, *mission(route, choices))):
+    for number, item in enumerate((home, *mission(flight, choices))):
         longitude, latitude, altitude = item.place or (0.0, 0.0, 0.0)
         # Ground stations and autopilots that read this format read no NaN: 0 is its "leave it as it is".
         params = [0.0 if math.isnan(value) else value for value in item.params]
@@ -106,10 +107,19 @@ def waypoint_file(route: FlownRoute, choices: FlightChoices) -> str:
     return "\n".join(lines) + "\n"
 
 
-def file_name(route: FlownRoute, ending: str) -> str:
-    """Name a UAV's file by its place in the swarm, from 1, and its id as far as file systems take it."""
-    identifier = _UNSAFE.sub("_", route.uav.id).strip("._") or "uav"
-    return f"{route.number + 1:03d}-{identifier[:60]}.{ending}"
+def file_name(flight: Flight, ending: str, *, numbered: bool) -> str:
+    """Name a file by the UAV's place in the swarm, from 1, and its id as far as file systems take it.
+
+    Parameters
+    ----------
+    flight, ending
+        The flight, and the ending of the name.
+    numbered
+        Whether the name has the number of the flight, too.
+    """
+    identifier = _UNSAFE.sub("_", flight.uav.id).strip("._") or "uav"
+    number = f"-flight-{flight.number}" if numbered else ""
+    return f"{flight.route + 1:03d}-{identifier[:60]}{number}.{ending}"
 
 
 def _simple_item(number: int, item: MissionItem, altitude_mode: int) -> dict[str, Any]:

@@ -16,9 +16,11 @@ from app.api.plan_formats import mission
 from app.api.plan_formats.archive import zip_archive
 from app.api.plan_formats.csv_table import csv_table
 from app.api.plan_formats.errors import NoPlan, NotGeographic, NothingToFly, UnknownUAV
-from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute, flown_plan
+from app.api.plan_formats.flights import Flight
+from app.api.plan_formats.flown_plan import FlownPlan, flown_plan
 from app.api.plan_formats.geojson import MEDIA_TYPE as GEOJSON
 from app.api.plan_formats.geojson import geojson
+from app.api.plan_formats.load_sheet import load_sheet
 from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
@@ -38,6 +40,7 @@ class PlanFormat(StrEnum):
     QGC_PLAN = "qgc-plan"
     QGC_WPL = "qgc-wpl"
     CSV = "csv"
+    LOAD_SHEET = "load-sheet"
     HTML = "html"
 
 
@@ -52,22 +55,27 @@ class _Document:
 
 @dataclass(frozen=True, slots=True)
 class _FlightFile:
-    """A format of one UAV's flight."""
+    """A format of one flight."""
 
-    write: Callable[[FlownRoute, FlightChoices], str]
+    write: Callable[[Flight, FlightChoices], str]
     media_type: str
     ending: str
 
 
-def _for_spreadsheets(plan: FlownPlan) -> str:
+def _for_spreadsheets(write: Callable[[FlownPlan], str]) -> _Document:
     """Write CSV with a byte order mark where a spreadsheet would take it for another encoding."""
-    table = csv_table(plan)
-    return table if table.isascii() else "\ufeff" + table
+
+    def marked(plan: FlownPlan) -> str:
+        table = write(plan)
+        return table if table.isascii() else "\ufeff" + table
+
+    return _Document(marked, "text/csv; charset=utf-8", "csv")
 
 
 _FORMATS: dict[PlanFormat, _Document | _FlightFile] = {
     PlanFormat.GEOJSON: _Document(geojson, GEOJSON, "geojson"),
-    PlanFormat.CSV: _Document(_for_spreadsheets, "text/csv; charset=utf-8", "csv"),
+    PlanFormat.CSV: _for_spreadsheets(csv_table),
+    PlanFormat.LOAD_SHEET: _for_spreadsheets(load_sheet),
     PlanFormat.HTML: _Document(printed_page, "text/html; charset=utf-8", "html"),
     PlanFormat.QGC_PLAN: _FlightFile(plan_file, "application/json", "plan"),
     PlanFormat.QGC_WPL: _FlightFile(waypoint_file, "text/plain; charset=utf-8", "waypoints"),
@@ -83,7 +91,7 @@ _OBJECT = {"schema": {"type": "object"}}
     response_class=Response,
     responses={
         200: {
-            "description": "The file; flight files of all UAVs that fly come as a ZIP archive",
+            "description": "The file; several flight files come as a ZIP archive",
             "content": {
                 GEOJSON: _OBJECT,
                 "application/json": _OBJECT,
@@ -113,15 +121,16 @@ async def get_plan(
     format: Annotated[
         PlanFormat,
         Query(
-            description="geojson, csv, html (a page to print): the whole plan. "
+            description="geojson, csv, html (a page to print): the whole plan. load-sheet: CSV of what each "
+            "UAV takes up before each flight. "
             "qgc-plan (QGroundControl's .plan), qgc-wpl (QGC WPL 110 waypoints): "
-            "flight files, one a UAV, for problems with crs wgs84"
+            "flight files, one a flight, for problems with crs wgs84"
         ),
     ],
     uav: Annotated[
         str | None,
         Query(
-            min_length=1, max_length=100, description="Id of the UAV of a flight file; default: all that fly"
+            min_length=1, max_length=100, description="Id of the UAV of flight files; default: all that fly"
         ),
     ] = None,
     altitude: Annotated[
@@ -146,7 +155,7 @@ async def get_plan(
         ),
     ] = Delivery.PAYLOAD_PLACE,
     end: Annotated[
-        Ending, Query(description="Flight files: return to launch after the last stop, or land there")
+        Ending, Query(description="Flight files: home after a UAV's last stop, or land there")
     ] = Ending.RETURN,
     servo_channel: Annotated[
         int, Query(ge=1, le=mission.MAX_SERVO_CHANNEL, description="With delivery=servo: the output")
@@ -201,20 +210,37 @@ def _file(job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices)
     if isinstance(kind, _Document):
         # A page is looked at in the browser, everything else is kept.
         how = "inline" if format is PlanFormat.HTML else "attachment"
-        return _response(kind.write(plan), kind.media_type, f"plan-{job.id[:8]}.{kind.ending}", how)
+        sheet = "-loads" if format is PlanFormat.LOAD_SHEET else ""
+        return _response(kind.write(plan), kind.media_type, f"plan-{job.id[:8]}{sheet}.{kind.ending}", how)
     if plan.problem.crs != "wgs84":
         raise NotGeographic(format.value, plan.problem.crs)
-    if uav is not None:
-        route = next((route for route in plan.routes if route.uav.id == uav), None)
-        if route is None:
-            raise UnknownUAV(uav)
-        if not route.flies:
-            raise NothingToFly(uav)
-        return _response(kind.write(route, choices), kind.media_type, file_name(route, kind.ending))
-    if not plan.flying:
-        raise NothingToFly(None)
-    files = {file_name(route, kind.ending): kind.write(route, choices) for route in plan.flying}
-    return _response(zip_archive(files), _ZIP, f"plan-{job.id[:8]}-{format}.zip")
+    flights = _flights(plan, uav)
+    files = {
+        file_name(flight, kind.ending, numbered=plan.has_bases): kind.write(flight, choices)
+        for flight in flights
+    }
+    if uav is not None and len(files) == 1:
+        ((name, text),) = files.items()
+        return _response(text, kind.media_type, name)
+    of_uav = "" if uav is None else f"-{flights[0].route + 1:03d}"
+    return _response(zip_archive(files), _ZIP, f"plan-{job.id[:8]}{of_uav}-{format}.zip")
+
+
+def _flights(plan: FlownPlan, uav: str | None) -> list[Flight]:
+    """Return the flights of a UAV, or of all.
+
+    Raises
+    ------
+    UnknownUAV, NothingToFly
+        If the plan does not have the UAV, or any flight.
+    """
+    routes = [route for route in plan.routes if uav in (None, route.uav.id)]
+    if uav is not None and not routes:
+        raise UnknownUAV(uav)
+    flights = [flight for route in routes for flight in route.flown]
+    if not flights:
+        raise NothingToFly(uav)
+    return flights
 
 
 def _response(content: str | bytes, media_type: str, name: str, how: str = "attachment") -> Response:

@@ -5,6 +5,7 @@ import { h } from "./dom.js";
 import { edit } from "./problem.js";
 import { sum } from "./plan.js";
 import { get, subscribe } from "./state.js";
+import { baseOf } from "./stops.js";
 
 const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
@@ -17,7 +18,7 @@ export function beginningNotes() {
     const { problem } = get();
     const committed = problem?.uavs.filter((uav) => uav.committed?.length) ?? [];
     const visits = problem?.start_plan ? visitsOfActions(problem, problem.start_plan) : [];
-    const all = sum(visits.map((list) => list.length));
+    const all = sum(visits.map((list) => list.filter((place) => baseOf(place) === null).length));
     notes.replaceChildren(
       ...(committed.length ? [line("locked", `Keeps ${counted(sum(committed.map((uav) => uav.committed.length)), "locked visit")} of ${counted(committed.length, "UAV")}.`, "Unlock all", () => edit(({ uavs }) => ({ uavs: uavs.map(without) })))] : []),
       ...(problem?.start_plan ? [line("plan", `Begins with a plan of ${counted(all, "visit")}, and gives none that earns less.`, "Begin anew", () => edit(() => ({ start_plan: undefined })))] : []));

@@ -1,29 +1,31 @@
-/** A plan as the visits of each UAV, which are moved, added and removed by hand. No page, no requests. */
+/** A plan as the places that each UAV stops at, of visits and reloads, which are moved, added and removed by hand. No page, no requests. */
 
-import { called, names } from "./plan.js";
+import { called, placeNames } from "./plan.js";
 import { shown } from "./dom.js";
+import { placeOf, placeOfAction, placesOf } from "./stops.js";
 
-/** The ids of the areas that each UAV visits, in order. @returns {string[][]} one list a UAV of the problem */
+/** The places that each UAV stops at, in order. @returns {string[][]} one list a UAV of the problem */
 export function visitsOf(problem, answer) {
   const routes = new Map(answer.routes.map((route) => [route.uav_id, route]));
-  return problem.uavs.map(({ id }) => (routes.get(id)?.stops ?? []).map((stop) => stop.target_id));
+  return problem.uavs.map(({ id }) => (routes.get(id)?.stops ?? []).map(placeOf));
 }
 
 /** The same as joint actions, one a step: who has no more visits flies home. */
 export function assignmentOf(problem, visits) {
-  const index = new Map(problem.targets.map(({ id }, j) => [id, j]));
+  const home = problem.targets.length;
+  const index = new Map([...placesOf(problem).keys()].map((place, at) => [place, at + Number(at >= home)]));
   const steps = Math.max(1, ...visits.map((list) => list.length));
-  return Array.from({ length: steps }, (_, step) => visits.map((list) => index.get(list[step]) ?? problem.targets.length));
+  return Array.from({ length: steps }, (_, step) => visits.map((list) => index.get(list[step]) ?? home));
 }
 
 /** Joint actions as the visits of each UAV. */
 export function visitsOfActions(problem, assignment) {
-  return problem.uavs.map((_, i) => assignment.map((row) => problem.targets[row[i]]?.id).filter((id) => id !== undefined));
+  return problem.uavs.map((_, i) => assignment.map((row) => placeOfAction(problem, row[i])).filter((id) => id !== undefined));
 }
 
 /** A plan of a problem for another one, in which UAVs and areas may be gone, new or in another order. */
 export function visitsFor(problem, before, visits) {
-  const known = new Set(problem.targets.map(({ id }) => id));
+  const known = placesOf(problem);
   const of = new Map(before.uavs.map(({ id }, i) => [id, visits[i]]));
   return problem.uavs.map(({ id }) => (of.get(id) ?? []).filter((each) => known.has(each)));
 }
@@ -53,7 +55,7 @@ export function withoutBroken(problem, visits, breaches) {
 /** A rule that an action breaks, in words with its figures. @param {object} breach as `POST /evaluate` has it */
 export function saidOfBreach(breach, problem) {
   const uav = problem.uavs.find(({ id }) => id === breach.uav_id);
-  const where = breach.target_id === null ? "" : `, visit ${breach.step} (${names(problem.targets)(breach.target_id)})`;
+  const where = breach.target_id === null ? "" : `, visit ${breach.step} (${placeNames(problem)(breach.target_id)})`;
   const figures = breach.needed === null ? "" : `: needs ${shown(breach.needed)}, has ${shown(breach.had)}`;
   return `${uav ? called(uav) : "The plan"}${where}: ${breach.says}${figures}`;
 }

@@ -1,11 +1,11 @@
 /** What the service says of a field of the problem, with the way to it. */
 
 import { h } from "./dom.js";
-import { ZONES } from "./kinds.js";
+import { BASES, ZONES } from "./kinds.js";
 import { get, select, set } from "./state.js";
 
 const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
-const LISTS = ["uavs", "targets", ZONES];
+const LISTS = ["uavs", "targets", BASES, ZONES];
 
 /**
  * A button that leads to what a JSON pointer is about.

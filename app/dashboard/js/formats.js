@@ -4,12 +4,13 @@ import { FormatError } from "./formats/error.js";
 import { fromCsv, toCsv } from "./formats/csv.js";
 import { fromGeoJson, toGeoJson } from "./formats/geojson.js";
 import { textOf } from "./formats/text.js";
+import { BASES } from "./kinds.js";
 import { normalised } from "./problem.js";
-import { wanted } from "./schema.js";
+import { itemFields, wanted } from "./schema.js";
 
 export { FormatError, toCsv, toGeoJson };
 
-const CALLED = { uavs: "UAV", targets: "area" };
+const CALLED = { uavs: "UAV", targets: "area", [BASES]: "base" };
 
 export function toJson(problem) {
   return `${JSON.stringify(problem, null, 2)}\n`;
@@ -61,18 +62,20 @@ function complete(problem, fields, notices) {
     return kept;
   };
   const items = (kind) => {
+    const known = itemFields(fields, kind);
     const found = problem[kind].map((item, at) => {
       const named = typeof item?.id === "number" ? { ...item, id: String(item.id) } : item;
       const name = `${CALLED[kind]} ${named?.id ?? at + 1}`;
-      const kept = checked(named, fields[kind], name);
-      const missing = Object.keys(fields[kind]).find((field) => fields[kind][field].needed && !(field in kept));
+      const kept = checked(named, known, name);
+      const missing = Object.keys(known).find((field) => known[field].needed && !(field in kept));
       if (missing) throw new FormatError(`${name} has no \`${missing}\``);
       return kept;
     });
-    return distinct(found, CALLED[kind], fields[kind].id.maxLength, notices);
+    return distinct(found, CALLED[kind], known.id.maxLength, notices);
   };
   const { uavs, targets, ...settings } = problem;
   const whole = { ...checked(settings, fields.settings, "the problem"), uavs: items("uavs"), targets: items("targets") };
+  if (whole[BASES]) whole[BASES] = items(BASES);
   if (unknown.size) notices.push(`Fields that the service does not know were left out: ${[...unknown].join(", ")}`);
   return normalised(whole);
 }

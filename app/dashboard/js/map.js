@@ -4,12 +4,13 @@ import * as L from "../vendor/leaflet/leaflet.js";
 import { Air } from "./air.js";
 import { Graticule } from "./graticule.js";
 import { h, shortAmounts, shown } from "./dom.js";
-import { ZONES } from "./kinds.js";
+import { BASES, ZONES } from "./kinds.js";
+import { stockText } from "./bases.js";
 import { called, met, rangeLeft, rangeShare, stateOf, urgency } from "./plan.js";
 import { addZone, extent, fewestCorners, move, place, position, remove, requestedBy, update } from "./problem.js";
 import { Routes } from "./routes.js";
 import { get, select, subscribe } from "./state.js";
-import { areaDot, areaSymbol, aside, uavDot, uavSymbol } from "./symbols.js";
+import { areaDot, areaSymbol, aside, depotSymbol, uavDot, uavSymbol } from "./symbols.js";
 import { ZoneCorners } from "./zone_corners.js";
 import { ZoneDrawing } from "./zone_drawing.js";
 
@@ -51,7 +52,7 @@ export class DispatchMap {
     this.#onProblem(problem ?? get().problem);
   }
 
-  /** The next click, or Enter on the map for its middle, places one. @param {"uavs"|"targets"} kind @param {() => void} [ended] */
+  /** The next click, or Enter on the map for its middle, places one. @param {"uavs"|"targets"|"bases"} kind @param {() => void} [ended] */
   startPlacing(kind, ended = () => {}) {
     this.stopPlacing();
     this.placing = { kind, ended };
@@ -97,7 +98,7 @@ export class DispatchMap {
     const box = extent(problem);
     this.shift = 0;
     if (!box || problem.crs !== "wgs84" || box.maxX - box.minX <= 180) return box;
-    const east = [...problem.uavs.flatMap((uav) => [uav.x_s, position(uav).x]), ...problem.targets.map(({ x }) => x), ...(problem.no_fly_zones ?? []).flatMap(({ polygon }) => polygon.map(([x]) => x))].map((x) => (x < 0 ? x + 360 : x));
+    const east = [...problem.uavs.flatMap((uav) => [uav.x_s, position(uav).x]), ...problem.targets.map(({ x }) => x), ...(problem[BASES] ?? []).map(({ x }) => x), ...(problem.no_fly_zones ?? []).flatMap(({ polygon }) => polygon.map(([x]) => x))].map((x) => (x < 0 ? x + 360 : x));
     const [minX, maxX] = [Math.min(...east), Math.max(...east)];
     if (maxX - minX >= box.maxX - box.minX) return box;
     this.shift = 360;
@@ -194,6 +195,7 @@ export class DispatchMap {
     this.symbols = new Map();
     this.dots = problem.targets.length + problem.uavs.length > DOTS_FROM;
     this.#drawAreas(problem, answer);
+    this.#drawDepots(problem, answer);
     this.#drawUavs(problem);
     for (const { marker, base } of this.before.values()) for (const layer of [marker, base]) if (layer) this.markers.removeLayer(layer);
     this.before = null;
@@ -221,6 +223,20 @@ export class DispatchMap {
         return lines.join("\n");
       };
       this.#addSymbol("targets", target, target, () => (this.dots ? areaDot : areaSymbol)(looks), [0, 0], looks, says);
+    }
+  }
+
+  #drawDepots(problem, answer) {
+    const left = new Map((answer?.bases ?? []).map(({ base_id: id, stock }) => [id, stock]));
+    for (const base of problem[BASES] ?? []) {
+      const says = () => {
+        const lines = [`${called(base)} · base`, `stock ${stockText(base.stock)}`];
+        if (left.has(base.id)) lines.push(`after the plan ${stockText(left.get(base.id))}`);
+        if (base.turnaround) lines.push(`turnaround ${shown(base.turnaround)}`);
+        return lines.join("\n");
+      };
+      const looks = { size: 34, name: called(base), stock: stockText(base.stock) };
+      this.#addSymbol(BASES, base, base, () => depotSymbol(looks), [0, 0], looks, says);
     }
   }
 

@@ -1,7 +1,7 @@
 /** What a new plan in the middle of a mission changes against the rest of the old one. */
 
 import { h, number, shown } from "./dom.js";
-import { names } from "./plan.js";
+import { names, placeNames } from "./plan.js";
 
 /**
  * @param {object} difference as `changes` of `mid_mission.js` has it
@@ -9,7 +9,7 @@ import { names } from "./plan.js";
  * @param {object} answer the new plan
  */
 export function differenceOf(difference, problem, answer) {
-  const [uavOf, areaOf] = [names(problem.uavs), names(problem.targets)];
+  const [uavOf, areaOf] = [names(problem.uavs), placeNames(problem)];
   const list = (ids) => (ids.length ? ids.map(areaOf).join(" → ") : "home");
   const percent = (share) => (share === null ? "–" : `${Math.round(100 * share)} %`);
   const gained = difference.kept && answer.reward - difference.kept.reward;

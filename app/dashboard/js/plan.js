@@ -1,6 +1,7 @@
 /** What a plan looks like: where routes go, what areas get. */
 
 import { position, requestedBy } from "./problem.js";
+import { baseOf, flightsOf, isReload, placeOf, placeOfAction, placesOf } from "./stops.js";
 
 /** What an item is called: its name, where it has one; names need not be unique, so its id stands beside it. */
 export function called({ id, name }) {
@@ -13,32 +14,66 @@ export function names(items) {
   return (id) => known.get(id) ?? id;
 }
 
-/** How long a UAV waits for its n-th visit (from 0), and whether before it takes off. */
-export function waiting(uav, stop, n) {
+/** What places are called; of a base that it is one. @returns {(place: string) => string} */
+export function placeNames(...problems) {
+  const known = new Map(problems.flatMap((problem) => [...placesOf(problem)]));
+  return (place) => {
+    const item = known.get(place);
+    const name = item ? called(item) : (baseOf(place) ?? place);
+    return baseOf(place) === null ? name : `base ${name}`;
+  };
+}
+
+/** How long a UAV waits at its n-th stop (from 0), and whether before it takes off. */
+export function waiting(uav, stops, n) {
+  const stop = stops[n];
   const time = (stop.begin_time ?? stop.arrival_time) - stop.arrival_time;
-  return { time, onGround: n === 0 && stateOf(uav) === "at its base" && !uav.airborne };
+  return { time, onGround: n === 0 ? stateOf(uav) === "at its base" && !uav.airborne : isReload(stops[n - 1]) };
 }
 
 /**
  * Routes of an answer, or of a list of joint actions, in one form.
  * @param {object} problem
  * @param {object | number[][]} plan an answer of the API, or an incumbent's `assignment`
- * @returns {{uav: object, index: number, stops: {target: object, stop: object | null}[], points: {x, y}[]}[]}
- *   only of UAVs that visit something; points begin at the present position, turn where the way does, and end at
- *   the start, or at the last stop where the UAV need not return
+ * @returns {{uav: object, index: number, stops: {place: string, item: object}[], flights: {number: number, points: {x, y}[]}[]}[]}
+ *   only of UAVs that stop somewhere; the points of a flight begin where it begins, turn where the way does, and end where it lands,
+ *   or at the last stop where the UAV need not return
  */
 export function routesOf(problem, plan) {
   if (!plan) return [];
-  const visits = Array.isArray(plan) ? visitsOfActions(problem, plan) : visitsOfAnswer(problem, plan);
-  const landings = new Map(Array.isArray(plan) ? [] : plan.routes.map((route) => [route.uav_id, route.landing]));
+  const places = placesOf(problem);
+  const known = Array.isArray(plan) ? null : new Map(plan.routes.map((route) => [route.uav_id, route]));
   return problem.uavs
-    .map((uav, index) => ({
-      uav,
-      index,
-      stops: visits[index],
-      points: [position(uav), ...visits[index].flatMap(({ target, stop }) => beyond(stop?.path, target)), ...wayHome(problem, uav, landings.get(uav.id))],
-    }))
+    .map((uav, index) => {
+      const route = known ? (known.get(uav.id) ?? { stops: [] }) : routeOfActions(problem, plan, index);
+      const stops = route.stops.map((stop) => ({ place: placeOf(stop), item: places.get(placeOf(stop)) }));
+      return { uav, index, stops, flights: legsOf(problem, uav, route, stops) };
+    })
     .filter(({ stops }) => stops.length);
+}
+
+/** A route of which nothing is known but where it leads. */
+function routeOfActions(problem, assignment, index) {
+  const places = assignment.map((joint) => placeOfAction(problem, joint[index])).filter((place) => place !== undefined);
+  return { stops: places.map((place) => (baseOf(place) === null ? { target_id: place } : { kind: "reload", base_id: baseOf(place), distance: 1 })) };
+}
+
+/** The points of each flight of a route. */
+function legsOf(problem, uav, route, stops) {
+  const numbers = flightsOf(route);
+  let from = position(uav);
+  const flights = [];
+  route.stops.forEach((stop, n) => {
+    if (flights.at(-1)?.number !== numbers[n]) flights.push({ number: numbers[n], points: [from] });
+    flights.at(-1).points.push(...beyond(stop.path, stops[n].item));
+    from = stops[n].item;
+  });
+  const home = wayHome(problem, uav, route.landing);
+  if (isReload(route.stops.at(-1))) {
+    // The last flight leads from a base straight home, where it is not home already.
+    if (home.length && route.return_distance !== 0) flights.push({ number: numbers.at(-1) + 1, points: [from, ...home] });
+  } else flights.at(-1)?.points.push(...home);
+  return flights;
 }
 
 /** Points of a way after its first: where it turns, and where it ends. */
@@ -48,26 +83,10 @@ function beyond(path, there) {
 
 /** The same of the way home; the answer to a problem without a world says nothing of it. */
 function wayHome(problem, uav, landing) {
-  const home = { x: uav.x_s, y: uav.y_s };
+  const base = problem.bases?.find(({ id }) => id === landing?.base_id);
+  const home = base ?? { x: uav.x_s, y: uav.y_s };
   if (landing === undefined) return [home];
   return problem.objective?.return_to_base === false ? [] : beyond(landing?.path, home);
-}
-
-function visitsOfActions(problem, assignment) {
-  return problem.uavs.map((_, i) =>
-    assignment
-      .map((joint) => problem.targets[joint[i]])
-      .filter((target) => target !== undefined)
-      .map((target) => ({ target, stop: null })),
-  );
-}
-
-function visitsOfAnswer(problem, answer) {
-  const targets = new Map(problem.targets.map((target) => [target.id, target]));
-  const routes = new Map(answer.routes.map((route) => [route.uav_id, route]));
-  return problem.uavs.map((uav) =>
-    (routes.get(uav.id)?.stops ?? []).map((stop) => ({ target: targets.get(stop.target_id), stop })),
-  );
 }
 
 /**

@@ -5,9 +5,10 @@ import { h, notify, number, shown } from "./dom.js";
 import { saidOfBreach, withMoved, withVisit, withoutBroken, withoutVisit } from "./draft.js";
 import { beginWith, changeDraft, dropDraft, judgeAgain, keepDraft } from "./drafting.js";
 import { lockedCount } from "./locks.js";
-import { called, names } from "./plan.js";
+import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
 import { get, select, set } from "./state.js";
+import { baseOf, placesOf } from "./stops.js";
 
 /** What the service says of the draft, and what can become of it. */
 export function judgement(problem, answer, draft) {
@@ -40,7 +41,7 @@ export class PlanEditor {
   /** @param {object} problem @param {string[][]} visits @param {{uav: number, at: number, act: string} | null} focus what was used last, where the visit is now */
   constructor(problem, visits, focus) {
     Object.assign(this, { problem, visits });
-    this.nameOf = names(problem.targets);
+    this.nameOf = placeNames(problem);
     this.form = null;
     this.body = h("tbody", {});
     this.element = h("details", { open: true }, h("summary", {}, "Routes, to be changed"),
@@ -91,7 +92,7 @@ export class PlanEditor {
     const act = (sign, what, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": `${what}: ${name}, visit ${at + 1} of ${called(uav)}`, title: what, dataset: { act: what }, disabled: !possible, onclick: does }, sign);
     const to = (place, what) => this.#change(withMoved(this.visits, { uav: i, at }, { uav: i, at: place }), { uav: i, at: place, act: what });
     return h("tr", { draggable: "true", dataset: { uavId: uav.id, uav: i, at, targetId: id } },
-      h("td", { class: "n" }, String(at + 1)), h("td", { title: id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, "locked")]), h("td", { class: "num" }, "–"),
+      h("td", { class: "n" }, String(at + 1)), h("td", { title: baseOf(id) ?? id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, "locked")]), h("td", { class: "num" }, "–"),
       h("td", { class: "acts" },
         act("↑", "Earlier", () => to(at - 1, "Earlier"), at > 0), act("↓", "Later", () => to(at + 1, "Later"), at < this.visits[i].length - 1),
         act("Move…", "Move", ({ target }) => this.#ask(target, { uav: i, at }, id)),
@@ -103,7 +104,7 @@ export class PlanEditor {
     this.form?.remove();
     const { problem, visits } = this;
     const option = (value, text, selected) => h("option", { value: String(value), selected }, text);
-    const area = id === null && h("select", { name: "area" }, problem.targets.map((target) => option(target.id, called(target), false)));
+    const area = id === null && h("select", { name: "area" }, [...placesOf(problem).keys()].map((place) => option(place, this.nameOf(place), false)));
     const uav = h("select", { name: "uav", onchange: () => limit() }, problem.uavs.map((each, i) => option(i, called(each), i === from.uav)));
     const place = h("input", { name: "place", type: "number", min: "1", step: "1", value: String(from.at + 1) });
     const limit = () => {

@@ -2,15 +2,15 @@
 
 import { notify } from "./dom.js";
 import { change } from "./history.js";
-import { STEMS, ZONES } from "./kinds.js";
+import { BASES, STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
 import { amountsOf, itemFields } from "./schema.js";
 import { BEGINNING, get, select, set } from "./state.js";
 
 /** A problem with ids filled in and what is not set left out. */
 export function normalised({ uavs = [], targets = [], ...settings }) {
-  const zones = settings[ZONES]?.length ? { [ZONES]: named(settings[ZONES], STEMS[ZONES]) } : {};
-  return { ...present(settings), ...zones, uavs: named(uavs, STEMS.uavs), targets: named(targets, STEMS.targets) };
+  const lists = [BASES, ZONES].filter((list) => settings[list]?.length).map((list) => [list, named(settings[list], STEMS[list])]);
+  return { ...present(settings), ...Object.fromEntries(lists), uavs: named(uavs, STEMS.uavs), targets: named(targets, STEMS.targets) };
 }
 
 /** Items with ids: the service's own by place in the list, or the next that is free. */
@@ -59,7 +59,7 @@ export function edit(changed) {
   change({ problem: { ...problem, ...changed(problem) } });
 }
 
-/** Change fields of a UAV, area or zone; undefined takes a field out. @param {"uavs"|"targets"|"no_fly_zones"} kind */
+/** Change fields of a UAV, area, base or zone; undefined takes a field out. @param {"uavs"|"targets"|"bases"|"no_fly_zones"} kind */
 export function update(kind, id, fields) {
   edit((problem) => {
     const items = problem[kind].map((item) => (item.id === id ? present({ ...item, ...fields }) : item));
@@ -79,14 +79,15 @@ export function remove(kind, id) {
 
 /** Move by hand: a UAV that has not left takes its starting point with it. */
 export function move(kind, id, { x, y }) {
-  if (kind === "targets") return update(kind, id, { x, y });
+  if (kind !== "uavs") return update(kind, id, { x, y });
   const uav = get().problem.uavs.find((each) => each.id === id);
   return update(kind, id, uav.x_c === undefined && uav.y_c === undefined ? { x_s: x, y_s: y } : { x_c: x, y_c: y });
 }
 
-/** Place a new UAV or area; it resembles the last of its kind. */
+/** Place a new UAV, area or base; it resembles the last of its kind. */
 export function place(kind, { x, y }) {
   const { problem } = get();
+  if (kind === BASES) return addBase(x, y);
   const last = problem[kind].at(-1);
   const id = freeId(kind, problem[kind]);
   const loadlist = last ? [...last.loadlist] : new Array(materials(problem)).fill(kind === "uavs" ? 10 : 5);
@@ -96,6 +97,15 @@ export function place(kind, { x, y }) {
       : { id, x, y, level: last?.level ?? 1, loadlist };
   edit((now) => withAdded(now, kind, item));
   select({ kind, id });
+}
+
+/** Add a base with as much as is asked for, and select it. */
+function addBase(x, y) {
+  const bases = get().problem[BASES] ?? [];
+  const { turnaround } = bases.at(-1) ?? {};
+  const base = { id: freeId(BASES, bases), x, y, ...(turnaround === undefined ? {} : { turnaround }) };
+  edit(() => ({ [BASES]: [...bases, base] }));
+  select({ kind: BASES, id: base.id });
 }
 
 /** Add a zone, and select it. @param {number[][]} polygon its corners */
@@ -119,7 +129,7 @@ export function fewestCorners() {
   return itemFields(get().fields, ZONES).polygon.minItems;
 }
 
-/** An id that none of the items has. @param {"uavs"|"targets"|"no_fly_zones"} kind */
+/** An id that none of the items has. @param {"uavs"|"targets"|"bases"|"no_fly_zones"} kind */
 export function freeId(kind, items) {
   const taken = new Set(items.map((item) => item.id));
   let n = items.length + 1;
@@ -134,16 +144,17 @@ function reach(problem) {
   return box ? 3 * Math.hypot(box.maxX - box.minX, box.maxY - box.minY) || 3 : 3;
 }
 
-/** Give every UAV and area so many kinds of material. */
+/** Give every UAV, area and base so many kinds of material. */
 export function setMaterials(count) {
   const { fields } = get();
   const fitted = (kind, items) => {
-    const names = amountsOf(fields[kind]);
+    const names = amountsOf(itemFields(fields, kind));
     const amounts = (list) => Array.from({ length: count }, (_, k) => list[k] ?? 0);
     return items.map((item) => ({ ...item, ...Object.fromEntries(names.filter((name) => item[name]).map((name) => [name, amounts(item[name])])) }));
   };
   edit((problem) => ({
     uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets),
+    ...(problem[BASES]?.length ? { [BASES]: fitted(BASES, problem[BASES]) } : {}),
     ...(problem.materials?.length ? { materials: Array.from({ length: count }, (_, k) => problem.materials[k] ?? {}) } : {}),
   }));
 }
@@ -168,7 +179,7 @@ export function extent(problem) {
     const now = position(uav);
     take(now.x, now.y);
   }
-  for (const target of problem.targets) take(target.x, target.y);
+  for (const { x, y } of [...problem.targets, ...(problem[BASES] ?? [])]) take(x, y);
   for (const { polygon } of problem.no_fly_zones ?? []) for (const [x, y] of polygon) take(x, y);
   return box;
 }

@@ -1,6 +1,6 @@
-/** What in a problem refers to its UAVs and areas: ids in lists of words, and the places in a plan to begin from. */
+/** What in a problem refers to its UAVs, areas and bases: ids in lists of words, and the places in a plan to begin from. */
 
-import { ZONES } from "./kinds.js";
+import { BASES, ZONES } from "./kinds.js";
 import { isIdsOf } from "./schema.js";
 
 /** A problem in which an item of a list has another id wherever it is named. */
@@ -14,6 +14,7 @@ export function withRemoved(problem, fields, list, at) {
   const { id } = problem[list][at];
   const home = problem.targets.length;
   const without = withIds({ ...problem, [list]: problem[list].toSpliced(at, 1) }, fields, list, (ids) => ids.filter((each) => each !== id));
+  if (list === BASES) return problem.start_plan ? { ...without, start_plan: withoutReloads(problem.start_plan, home, home + 1 + at) } : without;
   const rows = problem.start_plan?.map((row) => {
     if (list === "uavs") return row.toSpliced(at, 1);
     return row.map((action) => (action === at ? home - 1 : action - Number(action > at)));
@@ -24,8 +25,14 @@ export function withRemoved(problem, fields, list, at) {
 /** A problem whose list has got an item at its end, which the plan leaves where it is. */
 export function withAdded(problem, list, item) {
   const home = problem.targets.length;
-  const rows = problem.start_plan?.map((row) => (list === "uavs" ? [...row, home] : row.map((action) => action + Number(action === home))));
+  const rows = problem.start_plan?.map((row) => (list === "uavs" ? [...row, home] : row.map((action) => action + Number(action >= home))));
   return { ...problem, [list]: [...problem[list], item], ...(rows ? { start_plan: rows } : {}) };
+}
+
+/** A plan without the reloads at a base: what a UAV does after one comes a step sooner. */
+function withoutReloads(rows, home, gone) {
+  const columns = rows[0]?.map((_, i) => rows.map((row) => row[i]).filter((action) => action !== gone).map((action) => action - Number(action > gone))) ?? [];
+  return rows.map((_, step) => columns.map((actions) => actions[step] ?? home));
 }
 
 function withIds(problem, fields, list, change) {

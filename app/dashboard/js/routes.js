@@ -4,7 +4,7 @@ import * as L from "../vendor/leaflet/leaflet.js";
 import { paint } from "./colours.js";
 import { h } from "./dom.js";
 import { lockedCount } from "./locks.js";
-import { called, routesOf, sum } from "./plan.js";
+import { called, placeNames, routesOf, sum } from "./plan.js";
 import { select } from "./state.js";
 
 /** With more stops than this they have no numbers, and the lines are thinner. */
@@ -32,26 +32,30 @@ export class Routes {
     const routes = routesOf(problem, plan);
     const uavs = new Map(present.uavs.map((uav) => [uav.id, uav]));
     const stops = sum(routes.map((route) => route.stops.length));
-    for (const { uav, index, points, stops: visits } of routes) {
-      const line = L.polyline(points.map(latLng), { renderer: this.renderer, className: "route", weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
-      line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });
-      line.bindTooltip(() => h("span", {}, `${called(uav)}: ${visits.map(({ target }) => called(target)).join(" → ")}`), { sticky: true, className: "tip" });
-      this.layers.addLayer(line);
-      const path = line.getElement();
-      paint(path, uav.id);
-      Object.assign(path.dataset, { uavId: uav.id, stops: visits.map(({ target }) => target.id).join("\n") });
+    for (const { uav, index, flights, stops: visits } of routes) {
+      const places = visits.map(({ place }) => place);
+      const says = () => h("span", {}, `${called(uav)}: ${places.map(placeNames(problem)).join(" → ")}`);
+      for (const { number, points } of flights) {
+        const line = L.polyline(points.map(latLng), { renderer: this.renderer, className: `route${number > 1 ? " later-flight" : ""}`, weight: stops > FEW_STOPS ? 1.75 : 2.5, smoothFactor: 0.5 });
+        line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });
+        line.bindTooltip(says, { sticky: true, className: "tip" });
+        this.layers.addLayer(line);
+        const path = line.getElement();
+        paint(path, uav.id);
+        Object.assign(path.dataset, { uavId: uav.id, flight: number, stops: visits.map(({ item }) => item.id).join("\n") });
+      }
       if (stops <= FEW_STOPS) {
-        const locked = lockedCount(uavs.get(uav.id), visits.map(({ target }) => target.id));
-        visits.forEach(({ target }, at) => this.#drawOrder({ uav, index, target, at, locked: at < locked }, latLng));
+        const locked = lockedCount(uavs.get(uav.id), places);
+        visits.forEach(({ item }, at) => this.#drawOrder({ uav, index, item, at, locked: at < locked }, latLng));
       }
     }
   }
 
-  #drawOrder({ uav, index, target, at, locked }, latLng) {
+  #drawOrder({ uav, index, item, at, locked }, latLng) {
     const label = paint(h("span", {}, String(at + 1)), uav.id);
     const icon = L.divIcon({ className: `order${locked ? " locked" : ""}`, html: label, iconSize: [15, 15], iconAnchor: [-9 + 16 * (index % 3), 26] });
-    const marker = L.marker(latLng(target), { icon, interactive: false, keyboard: false, zIndexOffset: 500 });
+    const marker = L.marker(latLng(item), { icon, interactive: false, keyboard: false, zIndexOffset: 500 });
     this.layers.addLayer(marker);
-    Object.assign(marker.getElement().dataset, { uavId: uav.id, targetId: target.id });
+    Object.assign(marker.getElement().dataset, { uavId: uav.id, targetId: item.id });
   }
 }

@@ -3,9 +3,10 @@
 import { paint } from "./colours.js";
 import { amounts, h, number, svg } from "./dom.js";
 import { lockedCount, lockFirst } from "./locks.js";
-import { called, names, waiting } from "./plan.js";
+import { called, placeNames, waiting } from "./plan.js";
 import { Portions } from "./portions.js";
 import { get, select } from "./state.js";
+import { atBase, flightsOf, isReload, placeOf } from "./stops.js";
 
 const SHACKLE = { open: "M8 11V7a4 4 0 0 1 7.5-2", shut: "M8 11V7a4 4 0 0 1 8 0v4" };
 
@@ -16,15 +17,15 @@ const SHACKLE = { open: "M8 11V7a4 4 0 0 1 7.5-2", shut: "M8 11V7a4 4 0 0 1 8 0v
  * @returns {{element: HTMLElement, portions: Portions | null, markLocks: () => void}}
  */
 export function routesTable(problem, answer, tell) {
-  const head = ["UAV", "#", "Area", problem.crs === "wgs84" ? "Arrives, h" : "Arrives", "Unloads"];
+  const head = ["UAV", "#", problem.bases?.length ? "Where" : "Area", problem.crs === "wgs84" ? "Arrives, h" : "Arrives", "Unloads"];
   const out = answer.routes.filter((route) => route.stops.length);
   if (!out.length) return { element: h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance."), portions: null, markLocks: () => {} };
   const body = h("tbody", {});
   const uavs = new Map(problem.uavs.map((uav) => [uav.id, uav]));
-  const nameOf = names(problem.targets);
+  const nameOf = placeNames(problem);
   const markLocks = () => {
     const now = new Map(get().problem.uavs.map((uav) => [uav.id, uav]));
-    const visits = new Map(out.map((route) => [route.uav_id, route.stops.map((stop) => stop.target_id)]));
+    const visits = new Map(out.map((route) => [route.uav_id, route.stops.map(placeOf)]));
     for (const button of body.querySelectorAll("button.lock")) {
       const { uavId, at } = button.dataset;
       const locked = Number(at) < lockedCount(now.get(uavId), visits.get(uavId));
@@ -44,23 +45,34 @@ export function routesTable(problem, answer, tell) {
 }
 
 function routeRows(uav, route, nameOf, tell) {
+  const flights = flightsOf(route);
+  const reloads = route.stops.findIndex(isReload);
   return route.stops.map((stop, n) => {
     const key = paint(h("span", { class: "key", "aria-hidden": "true" }), route.uav_id);
-    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, called(uav)), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), " home")) : null;
-    return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step } }, first,
-      h("td", { class: "num" }, String(n + 1)), h("td", { class: "area", title: stop.target_id }, nameOf(stop.target_id)), h("td", { class: "num" }, number(stop.arrival_time), waitHint(uav, stop, n)),
-      h("td", { class: "num" }, amounts(stop.delivered)), h("td", {}, lockButton(uav, route, n, nameOf, tell)));
+    const first = n === 0 ? h("th", { scope: "rowgroup", rowspan: String(route.stops.length) }, h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, called(uav)), h("p", { class: "hint" }, number(route.distance, 3), " + ", number(route.return_distance, 3), route.landing?.base_id ? ` to ${nameOf(atBase(route.landing.base_id))}` : " home"), reloads >= 0 && h("p", { class: "hint" }, `${flights.at(-1) + Number(isReload(route.stops.at(-1)) && route.return_distance > 0)} flights`)) : null;
+    if (isReload(stop)) return reloadRow(route, stop, n, first, nameOf);
+    return h("tr", { dataset: { uavId: route.uav_id, targetId: stop.target_id, step: stop.step, flight: flights[n] } }, first,
+      h("td", { class: "num" }, String(n + 1)), h("td", { class: "area", title: stop.target_id }, nameOf(stop.target_id)), h("td", { class: "num" }, number(stop.arrival_time), waitHint(uav, route.stops, n)),
+      h("td", { class: "num" }, amounts(stop.delivered)), h("td", {}, (reloads < 0 || n < reloads) && lockButton(uav, route, n, nameOf, tell)));
   });
 }
 
+/** A stop at a base, which ends a flight. What comes after it cannot be locked: commitments come before all reloads. */
+function reloadRow(route, stop, n, first, nameOf) {
+  return h("tr", { class: "reload", dataset: { uavId: route.uav_id, baseId: stop.base_id, step: stop.step } }, first,
+    h("td", { class: "num" }, String(n + 1)), h("td", { class: "area", title: stop.base_id }, nameOf(placeOf(stop))),
+    h("td", { class: "num" }, number(stop.arrival_time), h("p", { class: "hint" }, "flies on from ", number(stop.departure_time))),
+    h("td", { class: "num" }, "loads ", amounts(stop.loaded)), h("td", {}));
+}
+
 /** What stands beside an arrival where the visit begins later. */
-function waitHint(uav, stop, n) {
-  const { time, onGround } = waiting(uav, stop, n);
-  return time > 0 ? h("p", { class: "hint" }, "waits ", number(time), onGround ? " on the ground, begins " : ", begins ", number(stop.begin_time)) : null;
+function waitHint(uav, stops, n) {
+  const { time, onGround } = waiting(uav, stops, n);
+  return time > 0 ? h("p", { class: "hint" }, "waits ", number(time), onGround ? " on the ground, begins " : ", begins ", number(stops[n].begin_time)) : null;
 }
 
 function lockButton(uav, route, n, nameOf, tell) {
-  const visits = route.stops.map((stop) => stop.target_id);
+  const visits = route.stops.map(placeOf);
   const name = nameOf(visits[n]);
   const act = () => {
     const count = lockedCount(get().problem.uavs.find(({ id }) => id === uav.id), visits);

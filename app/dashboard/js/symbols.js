@@ -26,6 +26,13 @@ export function areaDot({ urgent, met }) {
   return h("i", { class: `dot urgent-${urgent}${met >= 1 ? " met" : ""}` });
 }
 
+/** Draw a base: a house, with its name and stock beside it. */
+export function depotSymbol({ size, name, stock }) {
+  const drawn = svg("svg", { viewBox: "0 0 24 24", width: size, height: size, class: "depot" });
+  drawn.append(svg("path", { d: "M2 11 12 3l10 8v11H2z" }), svg("path", { class: "door", d: "M8 22v-7h8v7z" }));
+  return h("div", {}, drawn, h("span", { class: "depot-name" }, name, h("small", {}, stock)));
+}
+
 /** Draw a UAV among very many: a square in its colour, hollow where it is returning. */
 export function uavDot(uav) {
   const drawn = h("i", { class: `dot uav${uav.ret ? " returning" : ""}` });

@@ -3,6 +3,7 @@
 import { paint } from "./colours.js";
 import { svg } from "./dom.js";
 import { idOf } from "./kinds.js";
+import { atBase, placeOf, placesOf } from "./stops.js";
 
 /**
  * Draw a task.
@@ -12,13 +13,13 @@ import { idOf } from "./kinds.js";
  */
 export function taskPicture(task, { answer = null, label = "", width = 240, height = 160 } = {}) {
   const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label, class: "task-picture" });
-  const places = [
+  const spots = [
     ...task.uavs.flatMap((uav) => [[uav.x_s, uav.y_s], [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s]]),
-    ...task.targets.map((target) => [target.x, target.y]),
+    ...[...task.targets, ...(task.bases ?? [])].map(({ x, y }) => [x, y]),
     ...(task.no_fly_zones ?? []).flatMap(({ polygon }) => polygon),
   ];
-  const xs = places.map(([x]) => x);
-  const ys = places.map(([, y]) => y);
+  const xs = spots.map(([x]) => x);
+  const ys = spots.map(([, y]) => y);
   const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
   const margin = 10;
   const scale = Math.min((width - 2 * margin) / (right - left || 1), (height - 2 * margin) / (high - low || 1));
@@ -27,15 +28,14 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
   const at = ([x, y]) => [dx + (x - left) * scale, height - dy - (y - low) * scale];
   const line = (points) => points.map((place) => at(place).map((value) => value.toFixed(1)).join(",")).join(" ");
   for (const { polygon } of task.no_fly_zones ?? []) picture.append(svg("polygon", { points: line(polygon), class: "no-fly-zone" }));
-  const byId = new Map(task.targets.map((target, j) => [idOf("targets", target, j), target]));
+  const named = (list) => (task[list] ?? []).map((item, at) => ({ ...item, id: idOf(list, item, at) }));
+  const places = placesOf({ targets: named("targets"), bases: named("bases") });
   answer?.routes.forEach((route, i) => {
     if (!route.stops.length) return;
     const uav = task.uavs[i];
-    const points = [
-      [uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s],
-      ...route.stops.flatMap((stop) => stop.path?.slice(1) ?? [[byId.get(stop.target_id).x, byId.get(stop.target_id).y]]),
-      ...(route.landing?.path?.slice(1) ?? [[uav.x_s, uav.y_s]]),
-    ];
+    const way = (place, path) => path?.slice(1) ?? [[places.get(place).x, places.get(place).y]];
+    const home = route.landing?.base_id ? way(atBase(route.landing.base_id), route.landing.path) : (route.landing?.path?.slice(1) ?? [[uav.x_s, uav.y_s]]);
+    const points = [[uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s], ...route.stops.flatMap((stop) => way(placeOf(stop), stop.path)), ...home];
     picture.append(paint(svg("polyline", { points: line(points), class: "route", "data-uav": route.uav_id }), route.uav_id, i));
   });
   const most = Math.max(1e-12, ...task.targets.map((target) => target.level));
@@ -51,6 +51,10 @@ export function taskPicture(task, { answer = null, label = "", width = 240, heig
       }),
     );
   });
+  for (const base of task.bases ?? []) {
+    const [x, y] = at([base.x, base.y]);
+    picture.append(svg("rect", { x: (x - 4).toFixed(1), y: (y - 4).toFixed(1), width: 8, height: 8, class: "depot" }));
+  }
   for (const uav of task.uavs) {
     const [x, y] = at([uav.x_c ?? uav.x_s, uav.y_c ?? uav.y_s]);
     picture.append(svg("path", { d: `M${x.toFixed(1)} ${(y - 4).toFixed(1)}l3.5 6.5h-7z`, class: "uav" }));

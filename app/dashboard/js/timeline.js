@@ -1,10 +1,11 @@
-/** A timeline a UAV: its legs, where it waits, what it does at its stops, and the way home. */
+/** A timeline a UAV: its legs, where it waits, what it does at its stops, turnarounds at bases, and the way home. */
 
 import { paint } from "./colours.js";
 import { h, shortAmounts, shown } from "./dom.js";
-import { called, names } from "./plan.js";
+import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
 import { select } from "./state.js";
+import { baseOf } from "./stops.js";
 import { allTimes } from "./times.js";
 
 /**
@@ -16,7 +17,7 @@ import { allTimes } from "./times.js";
 export function timeline(problem, answer) {
   const times = allTimes(problem, answer);
   const rows = problem.uavs.map((uav, index) => ({ uav, ...times[index] })).filter(({ stops }) => stops.length);
-  const nameOf = names(problem.targets);
+  const nameOf = placeNames(problem);
   const end = Math.max(0, ...rows.map(({ home }) => home)) || 1;
   const share = (time) => `${(100 * time) / end}%`;
   const bar = (kind, from, to, title) => {
@@ -31,7 +32,13 @@ export function timeline(problem, answer) {
       const name = nameOf(stop.id);
       const { waits } = stop;
       if (waits) track.append(bar("wait", waits.from, waits.to, `waits for ${name} ${waits.onGround ? "on the ground" : "in the air"} until ${shown(waits.to)}`));
-      track.append(bar("leg", stop.left, stop.arrival, `to ${name}`));
+      track.append(bar("leg", stop.left, stop.arrival, stops.some(({ loaded }) => loaded) ? `flight ${stop.flight}, to ${name}` : `to ${name}`));
+      if (stop.loaded) {
+        const at = bar("turnaround", stop.begin, stop.done, `${n + 1}. ${name} at ${shown(stop.begin)}: loads ${shortAmounts(stop.loaded)}, takes off from ${shown(stop.done)}`);
+        at.dataset.baseId = baseOf(stop.id);
+        track.append(at);
+        return;
+      }
       const at = bar("visit", stop.begin, stop.done, `${n + 1}. ${name} at ${shown(stop.begin)}: ${shortAmounts(stop.delivered)}`);
       at.dataset.targetId = stop.id;
       track.append(at);

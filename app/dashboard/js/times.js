@@ -1,16 +1,18 @@
 /** When the UAVs of a plan do what, by the answer's own times. */
 
 import { stateOf, waiting } from "./plan.js";
+import { flightsOf, isReload, placeOf } from "./stops.js";
 
 /** When a UAV leaves for each stop, arrives, begins and is done there, when it waits, and when it is home. */
 export function timesOf(uav, route, targets) {
   let left = uav.available_from ?? 0;
+  const flights = flightsOf(route);
   const stops = route.stops.map((stop, n) => {
     const arrival = stop.arrival_time;
     const begin = stop.begin_time ?? arrival;
     const done = stop.departure_time ?? arrival + (targets.get(stop.target_id).service_time ?? 0);
-    const { time, onGround } = waiting(uav, stop, n);
-    const times = { id: stop.target_id, left, arrival, begin, done, delivered: stop.delivered, waits: null };
+    const { time, onGround } = waiting(uav, route.stops, n);
+    const times = { id: placeOf(stop), left, arrival, begin, done, delivered: stop.delivered, waits: null, flight: flights[n], ...(isReload(stop) ? { loaded: stop.loaded } : {}) };
     if (time > 0 && onGround) Object.assign(times, { left: left + time, arrival: begin, waits: { from: left, to: left + time, onGround } });
     else if (time > 0) times.waits = { from: arrival, to: begin, onGround };
     left = done;
@@ -45,15 +47,15 @@ export function homeward({ stops }, clock) {
 
 /**
  * What a UAV is doing at a clock.
- * @returns {{doing: "idle" | "waiting" | "flying" | "unloading" | "returning" | "home", next: string | null}} `next` is the area
+ * @returns {{doing: "idle" | "waiting" | "flying" | "unloading" | "reloading" | "returning" | "home", next: string | null}} `next` is the place
  */
 export function doingAt(uav, { stops, home }, clock) {
   const aloft = stateOf(uav) !== "at its base";
-  for (const [n, { id, left, begin, arrival, done }] of stops.entries()) {
+  for (const [n, { id, left, begin, arrival, done, loaded }] of stops.entries()) {
     // At the very moment it leaves it flies only where it was in the air before.
-    if (clock < arrival) return { doing: clock > left || (clock === left && (aloft || n > 0)) ? "flying" : "waiting", next: id };
+    if (clock < arrival) return { doing: clock > left || (clock === left && (n > 0 ? !stops[n - 1].loaded : aloft)) ? "flying" : "waiting", next: id };
     if (clock < begin) return { doing: "waiting", next: id };
-    if (clock < done) return { doing: "unloading", next: id };
+    if (clock < done) return { doing: loaded ? "reloading" : "unloading", next: id };
   }
   if (!stops.length && !aloft) return { doing: "idle", next: null };
   return { doing: clock < home ? "returning" : "home", next: null };

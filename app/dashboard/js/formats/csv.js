@@ -1,7 +1,7 @@
 /** A problem as CSV: a row an item, one of `kind` problem for the settings. Columns are the service's fields. */
 
-import { KINDS } from "../kinds.js";
-import { amountsOf, heldSettings, isAmounts, isWords } from "../schema.js";
+import { POINTS } from "../kinds.js";
+import { amountsOf, heldSettings, isAmounts, isWords, itemFields } from "../schema.js";
 import { wordsIn, writtenWords } from "../words.js";
 import { Numbers, plainText, table, toCells } from "./cells.js";
 import { FormatError } from "./error.js";
@@ -13,24 +13,26 @@ function stem(name) {
   return name === "loadlist" ? "load" : name;
 }
 
-/** Settings with their way in the problem; those of an object that is always there stand by themselves. */
+/** Settings with their way in the problem; those of an object that is always there stand by themselves. Lists of items are rows. */
 function settingsOf(fields) {
-  return Object.entries(fields.settings).flatMap(([name, schema]) =>
+  const rows = new Set(Object.values(POINTS));
+  return Object.entries(fields.settings).filter(([name]) => !rows.has(name)).flatMap(([name, schema]) =>
     schema.properties && !schema.nullable ? Object.entries(schema.properties).map(([inner, each]) => ({ column: inner, path: [name, inner], schema: each })) : [{ column: name, path: [name], schema }]);
 }
 
 export function toCsv(problem, fields) {
   const settings = settingsOf(fields);
-  const kinds = Object.entries(KINDS).map(([kind, list]) => ({ kind, list }));
-  const count = Math.max(0, ...kinds.flatMap(({ list }) => problem[list].flatMap((item) => amountsOf(fields[list]).map((name) => item[name]?.length ?? 0))));
+  // A problem without bases has no columns of theirs.
+  const kinds = Object.entries(POINTS).filter(([, list]) => problem[list]).map(([kind, list]) => ({ kind, items: problem[list], of: itemFields(fields, list) }));
+  const count = Math.max(0, ...kinds.flatMap(({ items, of }) => items.flatMap((item) => amountsOf(of).map((name) => item[name]?.length ?? 0))));
   const names = (name, schema) => (isAmounts(schema) ? Array.from({ length: count }, (_, k) => `${stem(name)}_${k + 1}`) : [name]);
-  const own = kinds.flatMap(({ list }) => Object.entries(fields[list]).flatMap(([name, schema]) => names(name, schema)));
+  const own = kinds.flatMap(({ of }) => Object.entries(of).flatMap(([name, schema]) => names(name, schema)));
   const columns = [...new Set(["kind", ...own, ...settings.map(({ column }) => column)])];
   const rows = [Object.fromEntries([["kind", "problem"], ...settings.map(({ column, path }) => [column, cell(path.reduce((at, name) => at?.[name], problem))])])];
-  for (const { kind, list } of kinds) {
-    for (const item of problem[list]) {
+  for (const { kind, items, of } of kinds) {
+    for (const item of items) {
       const row = { kind };
-      for (const [name, schema] of Object.entries(fields[list])) {
+      for (const [name, schema] of Object.entries(of)) {
         if (isAmounts(schema)) item[name]?.forEach((amount, k) => { row[`${stem(name)}_${k + 1}`] = amount; });
         else row[name] = isWords(schema) && item[name] ? writtenWords(item[name]) : cell(item[name]);
       }
@@ -71,8 +73,8 @@ export function fromCsv(text, present, fields) {
         if (outer.length) problem[outer[0]] = { ...problem[outer[0]], [last]: value };
         else problem[last] = value;
       }
-    } else if (kind in KINDS) problem[KINDS[kind]].push(reader.item(cells, line, fields[KINDS[kind]]));
-    else throw new FormatError(`line ${line}: \`kind\` is neither uav, area nor problem: ${reader.at(cells, "kind")}`);
+    } else if (kind in POINTS) (problem[POINTS[kind]] ??= []).push(reader.item(cells, line, itemFields(fields, POINTS[kind])));
+    else throw new FormatError(`line ${line}: \`kind\` is neither ${Object.keys(POINTS).join(", ")} nor problem: ${reader.at(cells, "kind")}`);
   }
   const notices = reader.leftOut(rows, fields, settings);
   if (reader.numbers.comma) notices.push(`Decimal commas were read: ${reader.numbers.comma.text} as ${reader.numbers.comma.text.replace(",", ".")}`);
@@ -143,8 +145,8 @@ class Reader {
   /** Say which filled columns were not read. */
   leftOut(rows, fields, settings) {
     const known = new Set(["kind", ...settings.map(({ column }) => column)]);
-    for (const list of Object.values(KINDS)) {
-      for (const [name, schema] of Object.entries(fields[list])) {
+    for (const list of Object.values(POINTS)) {
+      for (const [name, schema] of Object.entries(itemFields(fields, list))) {
         if (!isAmounts(schema)) known.add(name);
         else for (let k = 1; k <= this.#countOf(name); k += 1) known.add(`${stem(name)}_${k}`);
       }

@@ -3,7 +3,7 @@
  * member.
  */
 
-import { KINDS, ZONE, ZONES } from "../kinds.js";
+import { BASE, BASES, POINTS, ZONE, ZONES } from "../kinds.js";
 import { position } from "../problem.js";
 import { heldSettings, isAmounts, isWords, itemFields } from "../schema.js";
 import { wordsIn } from "../words.js";
@@ -16,13 +16,15 @@ export function toGeoJson(problem, fields) {
   const { uavs, targets, ...rest } = problem;
   const settings = { ...rest, crs: rest.crs ?? fields.settings.crs.default };
   const zones = rest[ZONES] ?? [];
-  if (zones.length) delete settings[ZONES];
+  const bases = rest[BASES] ?? [];
+  for (const list of [BASES, ZONES]) if (settings[list]?.length) delete settings[list];
   const point = ({ x, y }, kind, { id, ...properties }) => ({
     type: "Feature", id, geometry: { type: "Point", coordinates: [x, y] }, properties: { kind, ...properties },
   });
   const features = [
     ...uavs.map((uav) => point(position(uav), "uav", uav)),
     ...targets.map(({ x, y, ...target }) => point({ x, y }, "area", target)),
+    ...bases.map(({ x, y, ...base }) => point({ x, y }, BASE, base)),
     ...zones.map(zoneFeature),
   ];
   return `${JSON.stringify({ type: "FeatureCollection", settings, features }, null, 2)}\n`;
@@ -59,9 +61,9 @@ export function fromGeoJson(collection, present, fields) {
     const { kind: given, ...properties } = feature?.properties ?? {};
     const name = nameOf(feature, at);
     if (!feature?.geometry) return notices.push(`${name} has no geometry and was left out`);
-    const known = { ...KINDS, [ZONE]: ZONES };
+    const known = { ...POINTS, [ZONE]: ZONES };
     const kind = known[String(given ?? "").toLowerCase()];
-    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is ${Object.keys(KINDS).join(", ")} or ${ZONE}`);
+    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is ${Object.keys(POINTS).join(", ")} or ${ZONE}`);
     const schemas = itemFields(fields, kind);
     const item = {};
     for (const [field, value] of Object.entries(properties)) {
@@ -82,7 +84,7 @@ export function fromGeoJson(collection, present, fields) {
       return;
     }
     const [x, y] = onEarth(placeOf(feature.geometry, name, notices));
-    problem[kind].push(placed(kind, item, x, y));
+    (problem[kind] ??= []).push(placed(kind, item, x, y));
   });
   if (foreign.size) notices.push(`Attributes that are no fields of a problem were left out: ${[...foreign].join(", ")}`);
   return { problem, notices };
@@ -90,7 +92,7 @@ export function fromGeoJson(collection, present, fields) {
 
 /** An item at its place: a UAV that has a position of its own has that there, any other its starting point. */
 function placed(kind, item, x, y) {
-  if (kind === "targets") return { ...item, x, y };
+  if (kind !== "uavs") return { ...item, x, y };
   return { ...item, [item.x_c === undefined ? "x_s" : "x_c"]: x, [item.y_c === undefined ? "y_s" : "y_c"]: y };
 }
 
@@ -138,7 +140,7 @@ function placeOf({ type, coordinates }, name, notices) {
     return middles.reduce((a, b) => (b.area > a.area ? b : a)).place;
   }
   const many = type === "MultiPoint" ? ` of ${coordinates?.length ?? 0} points` : "";
-  throw new FormatError(`${name} is a ${type}${many}: a UAV or an area is one point`);
+  throw new FormatError(`${name} is a ${type}${many}: a UAV, an area or a base is one point`);
 }
 
 function pair(coordinates, name) {

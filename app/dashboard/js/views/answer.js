@@ -1,5 +1,6 @@
 /** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
 
+import { stocksLeft } from "../bases.js";
 import { amounts, h, number, shown } from "../dom.js";
 import { assignmentOf, visitsOf } from "../draft.js";
 import { beginDraft, beginWith } from "../drafting.js";
@@ -121,7 +122,7 @@ registerView({
         return dock.replaceChildren();
       }
       const plan = draft?.evaluation ?? answer;
-      rest.replaceChildren(unmetList(answerProblem, plan));
+      rest.replaceChildren(...[stocksLeft(answerProblem, plan)].filter(Boolean), unmetList(answerProblem, plan));
       const { element, portions } = timeline(answerProblem, plan);
       long.timeline = portions;
       dock.replaceChildren(...(element ? [element] : []));

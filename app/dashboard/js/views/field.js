@@ -4,7 +4,7 @@ import { ApiError } from "../api.js";
 import { h, notify, number, shortAmounts, shown } from "../dom.js";
 import { showPlan, undo } from "../history.js";
 import { changes, momentOf } from "../mid_mission.js";
-import { called, names, rangeLeft, sum } from "../plan.js";
+import { called, placeNames, rangeLeft, sum } from "../plan.js";
 import { answeredBy } from "../plan_notes.js";
 import { Portions } from "../portions.js";
 import { freeId } from "../problem.js";
@@ -250,7 +250,7 @@ function drawUavs(now) {
   const { problem, times } = plan();
   const { lost } = get().mission;
   const left = new Map(now.uavs.map((uav) => [uav.id, uav]));
-  const nameOf = names([...problem.targets, ...now.targets]);
+  const nameOf = placeNames(problem, now);
   const back = problem.objective?.return_to_base === false ? "landed" : "home";
   const body = h("tbody", {});
   parts.uavs.replaceChildren(
@@ -259,7 +259,8 @@ function drawUavs(now) {
       body));
   const rows = new Portions(body, problem.uavs, (uav, i) => {
         const { doing, next } = doingAt(uav, times[i], clock());
-        const says = { flying: `to ${nameOf(next)}`, unloading: `at ${nameOf(next)}`, home: back }[doing] ?? doing;
+        const place = next === null ? "" : nameOf(next);
+        const says = { flying: `to ${place}`, unloading: `at ${place}`, reloading: `reloads at ${place}`, home: back }[doing] ?? doing;
         const is = left.get(uav.id);
         return h("tr", { class: is ? null : "lost", "data-uav": uav.id },
           h("th", { scope: "row", title: uav.id }, called(uav)),

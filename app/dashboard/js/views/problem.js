@@ -6,7 +6,7 @@ import { Fields, labelled } from "../fields.js";
 import { read, toCsv, toGeoJson, toJson } from "../formats.js";
 import { Grid } from "../grid.js";
 import { redo, undo } from "../history.js";
-import { ZONES } from "../kinds.js";
+import { BASES, ZONES } from "../kinds.js";
 import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
@@ -18,11 +18,12 @@ import { cornersOf, drawingControls } from "../zone_form.js";
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
 /** What people call the fields that have other names; all others go by their own. */
 const TITLES = {
-  uavs: { id: "UAV", x_s: "base x", y_s: "base y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
+  uavs: { id: "UAV", x_s: "start x", y_s: "start y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
   targets: { id: "Area", level: "urgency", loadlist: "need" },
+  [BASES]: { id: "Base" },
   [ZONES]: { id: "Zone" },
 };
-const KINDS = { uavs: "UAVs", targets: "Areas", [ZONES]: "Zones" };
+const KINDS = { uavs: "UAVs", targets: "Areas", [BASES]: "Bases", [ZONES]: "Zones" };
 /** Types of settings that have one value, and so one form field. */
 const SINGLE = ["number", "integer", "boolean", "string"];
 const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
@@ -37,7 +38,8 @@ function columnsOf(kind, problem) {
   };
   const known = get().fields ? itemFields(get().fields, kind) : {};
   const plain = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
-  const held = ([name, schema]) => isAmounts(schema) && problem[kind]?.some((item) => item[name]);
+  // Without a stock a base has as much as is asked for, so that there is always a place to write one.
+  const held = ([name, schema]) => isAmounts(schema) && problem[kind]?.some((item) => kind === BASES || item[name]);
   const shownAs = (value, schema) => (value && isWords(schema) ? writtenWords(value) : value);
   const scalars = Object.entries(known).filter(plain).map(([name, schema]) => ({
     name, title: titled(name), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
@@ -63,10 +65,11 @@ function enter(kind, id, name, text) {
   if (schema?.type === "string") return update(kind, id, { [name]: text || undefined });
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
-  if (Number.isNaN(value) || (value === undefined && get().fields[kind][field].needed)) return notify(`${name} of ${id} needs a number`, "error");
+  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(`${name} of ${id} needs a number`, "error");
   if (k === undefined || value === undefined) return update(kind, id, { [field]: value });
-  // Amounts that were not set are those of the load until then.
-  update(kind, id, { [field]: (item[field] ?? item.loadlist).with(Number(k), value) });
+  // Amounts that were not set are those of the load until then; a base has none.
+  const before = item[field] ?? item.loadlist ?? new Array(materials(get().problem)).fill(0);
+  update(kind, id, { [field]: before.with(Number(k), value) });
 }
 
 function mountTables(dock) {
@@ -185,7 +188,7 @@ function placing(map) {
   subscribe(["past", "future"], enable);
   enable();
   const zone = drawingControls(map);
-  const row = h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
+  const row = h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), button(BASES, "Place bases"), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
   return [row, zone.steps];
 }
 
@@ -194,7 +197,7 @@ function mountInspector(root) {
   const draw = () => {
     const { selection, problem } = get();
     const item = selection && problem[selection.kind]?.find((each) => each.id === selection.id);
-    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area or a zone on the map or in the table to see and change it."));
+    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area, a base or a zone on the map or in the table to see and change it."));
     const { kind, id } = selection;
     const at = problem[kind].indexOf(item);
     const fields = columnsOf(kind, problem).map((column) => {

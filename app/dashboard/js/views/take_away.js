@@ -21,6 +21,7 @@ const FILES = [
 const DOCUMENTS = [
   ["geojson", "GeoJSON of the whole plan"],
   ["csv", "Table of all stops, CSV"],
+  ["load-sheet", "Load sheet, CSV"],
   ["html", "Page to print, saved"],
 ];
 
@@ -60,7 +61,7 @@ function mount(root) {
     row("Servo output", figure("servo_channel", "9", "1", "32", "1"), "servo"),
     row("Pulse width, µs", figure("servo_pwm", "1900", "500", "2500", "1"), "servo"),
     row("Gripper", figure("gripper", "1", "1", "8", "1"), "gripper"),
-    row("After the last stop", choice("end", [["return", "return to launch"], ["land", "land there"]])));
+    row("After the last stop", choice("end", [["return", "return, or go to its base"], ["land", "land there"]])));
   root.append(
     h("h2", {}, "Take it away"),
     staleNote("stale-export", "The problem was changed after this plan: what is saved here goes where the plan was made for. Allocate again first, or undo the change."),
