@@ -138,7 +138,7 @@ def test_what_is_taken_is_flown_legally_and_earns_what_is_told():
         assert told >= replay(problem_to_record(problem), nothing)["reward"] - 1e-12
     taken = set(later_fields()) - unobserved().keys()
     of_matrices = {"uavs.location", "uavs.home_location", "uavs.profile", "targets.location"}
-    # A capacity bounds what planned loading takes aboard, and no flight; the others are nothing without bases.
+    # A capacity bounds what planned loading takes aboard, no flight; the others are nothing without bases.
     assert used == taken - of_matrices - {"uavs.capacity", "uavs.full_load", "uavs.bases"}
 
 
