@@ -31,13 +31,7 @@ from app.api.errors import (
     UnsupportedContentEncoding,
     UnsupportedMediaType,
 )
-from app.api.json_structure import (
-    FEW_VALUES,
-    MOST_NAMES,
-    NestedTooDeep,
-    UnlikelyShape,
-    require_likely_shape,
-)
+from app.api.json_structure import FEW_VALUES, MOST_NAMES, NestedTooDeep, UnlikelyShape, require_likely_shape
 from app.api.problem_details import FieldError, problem_response
 from app.settings import Settings
 

@@ -10,11 +10,7 @@ from app.domain.errors import NoCompatibleSource
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.learning.universal.episodes.effort import roll_out_work
-from app.simulation.arrays import (
-    Integers,
-    ProblemArrays,
-    compile_problem,
-)
+from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.evaluation import rewards_of
 from app.simulation.simulator import new_episodes
 from app.simulation.stacks import without_reloads

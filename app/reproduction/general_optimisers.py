@@ -38,18 +38,11 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
-from app.simulation.arrays import (
-    Floats,
-    ProblemArrays,
-    compile_problem,
-)
+from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.legs import UNREACHABLE
 from app.simulation.simulator import act, end_step, new_episodes, verdict
-from app.simulation.stacks import (
-    alike,
-    without_reloads,
-)
+from app.simulation.stacks import alike, without_reloads
 from app.simulation.visit import ALLOWED
 
 _RESOLUTION = 1e5

@@ -22,18 +22,8 @@ from app.simulation.simulator import (
     unload,
     verdict,
 )
-from app.simulation.visit import (
-    ALLOWED,
-    NO_SUCH_ACTION,
-    RETURNING,
-    TOO_MANY_STEPS,
-    TOO_MUCH,
-    UNLOADS_NOTHING,
-)
-from app.simulation.worth import (
-    closing_cost,
-    has_closing_cost,
-)
+from app.simulation.visit import ALLOWED, NO_SUCH_ACTION, RETURNING, TOO_MANY_STEPS, TOO_MUCH, UNLOADS_NOTHING
+from app.simulation.worth import closing_cost, has_closing_cost
 
 
 class Replay(NamedTuple):

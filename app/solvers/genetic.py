@@ -20,14 +20,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_probl
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    close,
-    new_episodes,
-    promised,
-    reset_one,
-    verdict,
-)
+from app.simulation.simulator import act, close, new_episodes, promised, reset_one, verdict
 from app.simulation.visit import ALLOWED
 from app.solvers.parameters import GeneticParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion

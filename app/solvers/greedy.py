@@ -15,23 +15,9 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_probl
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
 from app.simulation.evaluation import reward_of
-from app.simulation.simulator import (
-    act,
-    earned_now,
-    end_step,
-    leg_home,
-    leg_to,
-    new_episodes,
-    verdict,
-)
-from app.simulation.visit import (
-    ALLOWED,
-    way_home,
-)
-from app.simulation.worth import (
-    cost_of,
-    most_earned_by,
-)
+from app.simulation.simulator import act, earned_now, end_step, leg_home, leg_to, new_episodes, verdict
+from app.simulation.visit import ALLOWED, way_home
+from app.simulation.worth import cost_of, most_earned_by
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.stop import never

@@ -7,18 +7,9 @@ import pytest
 
 from app.domain.problem import Objective
 from app.domain.surroundings import Base, Wind
-from app.simulation.arrays import (
-    AXES,
-    OF_UAVS,
-    compile_problem,
-)
+from app.simulation.arrays import AXES, OF_UAVS, compile_problem
 from app.simulation.generator import generate
-from app.simulation.stacks import (
-    alike,
-    part,
-    stack,
-    without_reloads,
-)
+from app.simulation.stacks import alike, part, stack, without_reloads
 
 SIZES = {"M": 4, "N": 6, "K": 2}
 

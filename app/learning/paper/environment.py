@@ -11,12 +11,7 @@ from app.domain.problem import Problem
 from app.learning.paper.architecture import TARGET_FIELDS, UAV_FIELDS, NetworkSizes
 from app.learning.paper.exploration import explore
 from app.learning.paper.observations import Float32s, features_of, write_states
-from app.simulation.arrays import (
-    Flags,
-    Floats,
-    Integers,
-    compile_problem,
-)
+from app.simulation.arrays import Flags, Floats, Integers, compile_problem
 from app.simulation.simulator import allowed_actions, new_episodes, reset
 
 

@@ -14,11 +14,7 @@ from app.learning.paper.observations import Float32s
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    end_step,
-    verdict,
-)
+from app.simulation.simulator import act, end_step, verdict
 from app.simulation.visit import ALLOWED
 
 

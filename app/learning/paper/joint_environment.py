@@ -10,22 +10,10 @@ from app.domain.problem import Problem
 from app.learning.paper.architecture import NetworkSizes
 from app.learning.paper.environment import swarm_sizes
 from app.learning.paper.observations import Float32s, features_of, write_states
-from app.simulation.arrays import (
-    Flags,
-    Floats,
-    Integers,
-    ProblemArrays,
-    compile_problem,
-)
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes, copy_episode
-from app.simulation.simulator import (
-    act,
-    end_step,
-    new_episodes,
-    reset,
-    verdict,
-)
+from app.simulation.simulator import act, end_step, new_episodes, reset, verdict
 from app.simulation.visit import ALLOWED
 
 MAX_JOINT_ACTIONS = 20_000

@@ -11,12 +11,7 @@ import numpy as np
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes, copy_episode
-from app.simulation.simulator import (
-    act,
-    close,
-    new_episodes,
-    verdict,
-)
+from app.simulation.simulator import act, close, new_episodes, verdict
 from app.simulation.visit import ALLOWED
 from app.simulation.worth import most_earned_by
 from app.solvers.local_search.annealing import ROUNDING

@@ -13,13 +13,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    close,
-    new_episodes,
-    reset_one,
-    verdict,
-)
+from app.simulation.simulator import act, close, new_episodes, reset_one, verdict
 from app.simulation.visit import ALLOWED, START, airborne, leg, ready
 from app.solvers.bound.instance import Instance
 from app.solvers.bound.relaxation import Pools, Priced

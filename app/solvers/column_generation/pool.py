@@ -12,13 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
-from app.simulation.arrays import (
-    NONE,
-    Flags,
-    Floats,
-    Integers,
-    ProblemArrays,
-)
+from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
 from app.simulation.stacks import alike
 from app.solvers.local_search.routes import charged_distance

@@ -34,10 +34,7 @@ from app.simulation.visit import (
     time_home,
     way_home,
 )
-from app.simulation.worth import (
-    closing_cost,
-    has_closing_cost,
-)
+from app.simulation.worth import closing_cost, has_closing_cost
 
 SATISFACTION, DISTANCE, USELESS, CLOSING = 0, 1, 2, 3
 """Columns of ``Routes.total``."""

@@ -20,12 +20,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
 from app.simulation.legs import UNREACHABLE
-from app.simulation.simulator import (
-    earned_now,
-    leg_home,
-    leg_to,
-    verdict,
-)
+from app.simulation.simulator import earned_now, leg_home, leg_to, verdict
 from app.simulation.visit import (
     ALLOWED,
     air_length,
@@ -38,10 +33,7 @@ from app.simulation.visit import (
     leg_time,
     way_home,
 )
-from app.simulation.worth import (
-    cost_of,
-    earned_by,
-)
+from app.simulation.worth import cost_of, earned_by
 
 FOLLOW_UPS = 16
 """Near targets considered for the visit after the next."""

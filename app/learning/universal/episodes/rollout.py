@@ -25,12 +25,7 @@ from app.learning.universal.network.inference import ask_together, attention_bia
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    close,
-    end_step,
-    new_episodes,
-)
+from app.simulation.simulator import act, close, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 

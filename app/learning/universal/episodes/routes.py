@@ -5,12 +5,7 @@ from __future__ import annotations
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    close,
-    reset_one,
-    verdict,
-)
+from app.simulation.simulator import act, close, reset_one, verdict
 from app.simulation.visit import ALLOWED, START, airborne, ready
 
 NOBODY = -1

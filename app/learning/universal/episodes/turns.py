@@ -7,22 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from app.learning.compute.kernels import Float32s
-from app.learning.universal.episodes.observation import (
-    VisitGains,
-    look,
-    look_again,
-    new_gains,
-    observe,
-)
+from app.learning.universal.episodes.observation import VisitGains, look, look_again, new_gains, observe
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    end_step,
-    new_episodes,
-)
+from app.simulation.simulator import act, end_step, new_episodes
 
 
 class Turns(NamedTuple):

@@ -16,10 +16,7 @@ from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.updates.learner import Learner, make_batch
 from app.learning.universal.updates.update_time import UpdateTime
-from app.simulation.arrays import (
-    Integers,
-    ProblemArrays,
-)
+from app.simulation.arrays import Integers, ProblemArrays
 from app.simulation.stacks import stack
 from app.solvers.protocol import StopCriterion, no_spare_threads
 

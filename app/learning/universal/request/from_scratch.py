@@ -18,10 +18,7 @@ from app.learning.universal.network.architecture import HEADS, WIDEST, Universal
 from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.request.recombination import Recombination
-from app.simulation.arrays import (
-    ProblemArrays,
-    compile_problem,
-)
+from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
 from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan

@@ -16,28 +16,12 @@ import numpy as np
 from app.learning.universal.episodes.rollout import exploration, play
 from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
-from app.simulation.arrays import (
-    Flags,
-    Floats,
-    Integers,
-    ProblemArrays,
-)
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import (
-    act,
-    earned_now,
-    new_episodes,
-    reset_one,
-    verdict,
-)
+from app.simulation.simulator import act, earned_now, new_episodes, reset_one, verdict
 from app.simulation.stacks import part
-from app.simulation.visit import (
-    ALLOWED,
-    COMMITTED_ELSEWHERE,
-    START,
-    leg,
-)
+from app.simulation.visit import ALLOWED, COMMITTED_ELSEWHERE, START, leg
 from app.simulation.worth import cost_of
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never

@@ -28,10 +28,7 @@ from app.learning.universal.request.fine_tuning import FineTuning, require_memor
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.recombination import Recombination
 from app.learning.universal.request.replanning import replan, round_of
-from app.simulation.arrays import (
-    Integers,
-    compile_problem,
-)
+from app.simulation.arrays import Integers, compile_problem
 from app.simulation.simulator import new_episodes
 from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan
