@@ -33,15 +33,9 @@ def draw_flight_move(
         return _insert_at_best(arrays, routes, near, change, rng, i)
     kind = (kind - _INTO_BEST) / (1.0 - _INTO_BEST) if kind >= _INTO_BEST else rng.random()
     s = _draw_reload(routes, near, rng, i)
-    if s == NONE:
-        return (
-            _insert_flight(routes, near, change, rng, i)
-            if kind < 0.6
-            else _reload(routes, near, change, rng, i)
-        )
-    if kind < 0.3:
+    if kind < (0.6 if s == NONE else 0.3):
         return _insert_flight(routes, near, change, rng, i)
-    if kind < 0.45:
+    if s == NONE or kind < 0.45:
         return _reload(routes, near, change, rng, i)
     if kind < 0.6:
         return _drop(routes, change, i, s, s + 1)
