@@ -220,7 +220,7 @@ LISTS = {"uavs", "targets"}
         ("schema.js", LISTS),
         ("formats.js", LISTS | {"id"}),
         ("fields.js", {"id"}),
-        ("kinds.js", LISTS | {"id", "no_fly_zones"}),
+        ("kinds.js", LISTS | {"id", "bases", "no_fly_zones"}),
         ("formats/cells.js", set()),
         ("formats/csv.js", LISTS | {"loadlist"}),
         ("formats/geojson.js", LISTS | POSITIONS),

@@ -16,7 +16,6 @@ export function toGeoJson(problem, fields) {
   const { uavs, targets, ...rest } = problem;
   const settings = { ...rest, crs: rest.crs ?? fields.settings.crs.default };
   const zones = rest[ZONES] ?? [];
-  const bases = rest[BASES] ?? [];
   for (const list of [BASES, ZONES]) if (settings[list]?.length) delete settings[list];
   const point = ({ x, y }, kind, { id, ...properties }) => ({
     type: "Feature", id, geometry: { type: "Point", coordinates: [x, y] }, properties: { kind, ...properties },
@@ -24,7 +23,7 @@ export function toGeoJson(problem, fields) {
   const features = [
     ...uavs.map((uav) => point(position(uav), "uav", uav)),
     ...targets.map(({ x, y, ...target }) => point({ x, y }, "area", target)),
-    ...bases.map(({ x, y, ...base }) => point({ x, y }, BASE, base)),
+    ...(rest[BASES] ?? []).map(({ x, y, ...base }) => point({ x, y }, BASE, base)),
     ...zones.map(zoneFeature),
   ];
   return `${JSON.stringify({ type: "FeatureCollection", settings, features }, null, 2)}\n`;
