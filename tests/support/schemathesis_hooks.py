@@ -86,7 +86,7 @@ def is_beyond_observation(problem, asked, default):
     """Say whether a problem has what the paper's learners, if one is asked for, do not observe."""
     papers = asked.get("algorithm", default) == "dqn" or asked.get("parameters", {}).get("mode") == "paper"
     objective = problem.get("objective") or {}
-    unseen = [problem.get(name) for name in ("no_fly_zones", "matrices")]
+    unseen = [problem.get(name) for name in ("bases", "no_fly_zones", "matrices")]
     unseen += [objective.get(name) for name in ("half_life", "makespan_weight", "change_weight")]
     return papers and any(unseen)
 

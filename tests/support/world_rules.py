@@ -20,7 +20,8 @@ DOUBTFUL = 1e-6
 def breaks_rules_of_the_world(problem):
     """Whether a problem that keeps to the schema breaks a rule that no schema can say."""
     return any(
-        broken(problem) for broken in (texts, materials, promises, exclusions, start_plan, matrices, zones)
+        broken(problem)
+        for broken in (texts, materials, bases, promises, exclusions, start_plan, matrices, zones)
     )
 
 
@@ -29,14 +30,16 @@ def named(item, stem, number):
 
 
 def texts(problem):
-    items = [*problem["uavs"], *problem["targets"], *(problem.get("no_fly_zones") or [])]
+    zones, bases = problem.get("no_fly_zones") or [], problem.get("bases") or []
+    items = [*problem["uavs"], *problem["targets"], *zones, *bases]
     words = [item[key] for item in items for key in ("name", "profile") if item.get(key) is not None]
     words += [
         word for item in items for key in ("skills", "excluded", "committed") for word in item.get(key) or []
     ]
     words += [each["name"] for each in problem.get("materials") or [] if each.get("name") is not None]
     words += list(problem.get("matrices") or {})
-    zones = [named(zone, "zone", number) for number, zone in enumerate(problem.get("no_fly_zones") or [], 1)]
+    ids = [[named(zone, "zone", number) for number, zone in enumerate(zones, 1)]]
+    ids += [[named(base, "base", number) for number, base in enumerate(bases, 1)]]
     sizes = [
         len(
             json.dumps(item["properties"], ensure_ascii=False, separators=(",", ":")).encode(
@@ -47,7 +50,9 @@ def texts(problem):
         if item.get("properties") is not None
     ]
     return (
-        any(map(fault_of, [*words, *zones])) or len(set(zones)) < len(zones) or max(sizes, default=0) > 4096
+        any(map(fault_of, [*words, *ids[0], *ids[1]]))
+        or any(len(set(each)) < len(each) for each in ids)
+        or max(sizes, default=0) > 4096
     )
 
 
@@ -58,9 +63,25 @@ def materials(problem):
     weights = [each.get("weight", 1.0) for each in given] or [1.0] * len(problem["uavs"][0]["loadlist"])
     return any(
         uav.get("capacity") is not None
-        and sum(w * a for w, a in zip(weights, uav["loadlist"], strict=True)) > uav["capacity"] * (1 + 0.9e-9)
+        and sum(w * max(a, b) for w, a, b in zip(weights, uav["loadlist"], full_load(uav), strict=False))
+        > uav["capacity"] * (1 + 0.9e-9)
         for uav in problem["uavs"]
     )
+
+
+def full_load(uav):
+    return uav["loadlist"] if uav.get("full_load") is None else uav["full_load"]
+
+
+def bases(problem):
+    given, number = problem.get("bases") or [], len(problem["uavs"][0]["loadlist"])
+    amounts = [base["stock"] for base in given if base.get("stock") is not None]
+    if any(len(each) != number for each in [*amounts, *map(full_load, problem["uavs"])]):
+        return True
+    if problem.get("crs") == "wgs84" and any(abs(base["x"]) > 180 or abs(base["y"]) > 90 for base in given):
+        return True
+    known = {named(base, "base", place) for place, base in enumerate(given, 1)}
+    return any(not known.issuperset(uav.get("bases") or ()) for uav in problem["uavs"])
 
 
 def promises(problem):
@@ -89,11 +110,13 @@ def start_plan(problem):
         return False
     if not 1 <= len(plan) <= problem.get("max_steps", 5):
         return True
-    return any(len(row) != m or any(action > n for action in row) for row in plan)
+    last = n + len(problem.get("bases") or ())
+    return any(len(row) != m or any(action > last for action in row) for row in plan)
 
 
 def matrices(problem):
-    given, uavs, targets = problem.get("matrices"), problem["uavs"], problem["targets"]
+    given, uavs = problem.get("matrices"), problem["uavs"]
+    targets = [*problem["targets"], *(problem.get("bases") or ())]
     if given is None:
         places = [item.get(key) for item in uavs for key in ("location", "home_location", "profile")]
         return any(place is not None for place in [*places, *(target.get("location") for target in targets)])
@@ -126,7 +149,7 @@ def zones(problem):
     corners = [corner for polygon in polygons for corner in polygon]
     if any(abs(x) > 180 or abs(y) > 90 for x, y in corners):
         return True
-    places = [(target["x"], target["y"]) for target in problem["targets"]]
+    places = [(stop["x"], stop["y"]) for stop in [*problem["targets"], *(problem.get("bases") or ())]]
     for uav in problem["uavs"]:
         start = uav["x_s"], uav["y_s"]
         now = [
