@@ -201,13 +201,15 @@ def aloft_after(
 @inlined
 def exceeds_endurance(arrays: ProblemArrays, p: int, i: int, j: int, aloft: float) -> bool:
     """Whether a stop exceeds the endurance (rule 2), by :func:`aloft_after`."""
-    return aloft + time_home(arrays, p, i, j) > farthest(arrays.uavs[p, i].endurance)
+    home = 0.0 if is_base(arrays, j) else time_home(arrays, p, i, j)
+    return aloft + home > farthest(arrays.uavs[p, i].endurance)
 
 
 @inlined
 def lands_late(arrays: ProblemArrays, p: int, i: int, j: int, end: float) -> bool:
     """Whether a UAV would land after ``available_until`` (rule 2), by the clock at the end of a stop."""
-    return end + time_home(arrays, p, i, j) > latest(arrays.uavs[p, i].until)
+    home = 0.0 if is_base(arrays, j) else time_home(arrays, p, i, j)
+    return end + home > latest(arrays.uavs[p, i].until)
 
 
 @inlined
