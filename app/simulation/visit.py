@@ -63,7 +63,7 @@ def is_base(arrays: ProblemArrays, j: int) -> bool:
 
 @inlined
 def is_unlimited(arrays: ProblemArrays, j: int) -> bool:
-    """Whether a stop is a base with as much as is asked for: there nobody takes from others."""
+    """Whether a stop of the first problem is a base with as much as is asked for."""
     return is_base(arrays, j) and arrays.stock[0, j - arrays.need.shape[1] - 1, 0] == np.inf
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.evaluation import reward_of
-from app.solvers.bound.enumeration import Enumeration
+from app.solvers.bound.enumeration import Enumeration, is_tiny
 from app.solvers.bound.instance import Instance, new_instance
 from app.solvers.bound.joint_plans import JointPlans
 from app.solvers.bound.tree import PROVEN, Tree
@@ -43,8 +43,8 @@ class Exact:
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`; the solution has a proof."""
         instance = new_instance(problem)
-        few = sets_are_few(instance)
-        share = _SEARCH_SHARE if few or problem.bases else _SEARCH_SHARE_LARGE
+        few = is_tiny(instance.arrays) if problem.bases else sets_are_few(instance)
+        share = _SEARCH_SHARE if few else _SEARCH_SHARE_LARGE
 
         def searching(progress: Progress) -> None:
             report(Progress(share * progress.fraction, 0, progress.best_reward, progress.incumbent))
@@ -57,7 +57,7 @@ class Exact:
         history = History()
         history.add(0, reward)
         if problem.bases:
-            return self._by_enumeration(problem, instance, plan, history, stop, share, report)
+            return self._with_bases(problem, instance, plan, history, stop, share, report)
         lower = reward / instance.scale
         sets = enumerate_sets(instance, stop)
         if sets is None:
@@ -83,7 +83,7 @@ class Exact:
         bound = max(reward, tree.bound * instance.scale)
         return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
 
-    def _by_enumeration(
+    def _with_bases(
         self,
         problem: Problem,
         instance: Instance,
@@ -95,10 +95,10 @@ class Exact:
     ) -> Solution:
         """Fly all plans of a tiny problem, and bound those of another one."""
         reward = history.reward[-1]
-        plans = Enumeration(instance.arrays, reward)
+        plans = Enumeration(instance.arrays, reward) if is_tiny(instance.arrays) else None
         most = self.parameters.nodes
         for node in range(1, most + 1):
-            if plans.complete or stop():
+            if plans is None or plans.complete or stop():
                 break
             plans.run(stop, node * _ACTIONS_A_NODE)
             if plans.actions is not None:
@@ -107,7 +107,7 @@ class Exact:
                 history.add(node, reward)
             report(Progress(share + (1.0 - share) * node / most, node, reward, plan))
         bound = reward
-        if not plans.complete:
+        if plans is None or not plans.complete:
             bound = max(reward, bound_without_sets(instance, reward / instance.scale, stop) * instance.scale)
         return Solution(plan, history, self.parameters, proof=_proof(bound, reward, instance.scale))
 

@@ -327,6 +327,22 @@ def test_times_computed_by_hand():
     assert to_record(explain(stays, Plan(((1,),))))["routes"][0]["landing"] is None
 
 
+def test_a_reload_needs_no_way_home_also_where_a_matrix_has_one_from_a_place_to_itself():
+    # 1.5 to the area, 1.5 to the base: as long as its battery lasts. The base's way to itself takes 5.
+    uav = replace(plain().uavs[0], endurance=3.5, voyage=99.0, location=0, loadlist=(2.0,))
+    problem = plain(
+        uavs=(uav,),
+        targets=(replace(plain().targets[0], location=1),),
+        matrices={"road": Matrix([[0, 3, 3], [3, 0, 3], [3, 3, 10]])},
+        bases=(Base("b", 3, 3, location=2),),
+        objective=Objective(return_to_base=True),
+    )
+    plan = Plan(((0,), (3,)))
+    problem = replace(problem, targets=(replace(problem.targets[0], loadlist=(9.0,)),))
+    answer = explain(problem, Plan((plan.assignment[0], (2,))))
+    assert answer.routes[0].stops[1].loaded == (2.0,)
+
+
 def test_changes_are_counted_also_where_they_cost_nothing():
     two = replace(plain(), targets=(plain().targets[0], replace(plain().targets[0], id="b", y=1.0)))
     problem = replace(two, start_plan=((1,),))

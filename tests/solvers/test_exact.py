@@ -12,6 +12,7 @@ from stopping import After
 from app.domain.records import problem_to_record
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
+from app.simulation.world_generator import WORLD_FAMILIES
 from app.solvers.exact import Exact
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.solver import LocalSearch
@@ -39,6 +40,18 @@ def test_it_is_the_best_there_is(seed):
         assert solution.proof.proven
         assert reward_of(problem, solution.plan) == pytest.approx(best, abs=1e-8)
         assert solution.proof.bound >= best - 1e-12 * abs(best)
+
+
+@pytest.mark.parametrize(("m", "n", "proven"), [(1, 3, True), (12, 40, False), (200, 500, False)])
+def test_with_bases_tiny_problems_are_proven_and_others_bounded(m, n, proven):
+    problem = replace(
+        WORLD_FAMILIES["stock"](m, n, 2, np.random.default_rng(2)), max_steps=4 if proven else 15
+    )
+    solution = solve(problem, Deadline(2.0))
+    reward = reward_of(problem, solution.plan)
+    assert solution.proof.proven == proven
+    assert reward >= reward_of(problem, greedy_plan(problem)) - 1e-9 or not proven
+    assert solution.proof.bound >= reward - 1e-9
 
 
 @pytest.mark.parametrize("family", ["uniform", "deadline", "clustered"])

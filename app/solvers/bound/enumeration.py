@@ -6,6 +6,8 @@ best plan known.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
@@ -21,8 +23,18 @@ _PIECE = 5_000
 """Actions between two looks at the stop criterion: a few milliseconds."""
 
 
+_MOST_DIGITS = 14.0
+"""Digits that the number of sequences of actions may have: most are not legal, or too bad to go on."""
+
+
+def is_tiny(arrays: ProblemArrays) -> bool:
+    """Whether a problem has so few plans that it is worth trying to fly them all."""
+    m, n, _ = arrays.shape
+    return int(arrays.max_steps[0]) * m * math.log10(n + 1 + arrays.n_bases) <= _MOST_DIGITS
+
+
 class Enumeration:
-    """All plans of the first problem of a stack, one after the other.
+    """All plans of the first problem of a stack, which is tiny, one after the other.
 
     Parameters
     ----------

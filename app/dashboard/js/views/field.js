@@ -370,7 +370,7 @@ async function again() {
     const { now } = from;
     const { problem } = known;
     const at = clock();
-    if (!now.uavs.length) throw new Error("Every UAV is lost: nobody is left to fly.");
+    if (!now.uavs.length) throw new Error("Every UAV is lost: no UAV is left to fly.");
     const given = await allocate(
       { ...now, algorithm: parts.algorithm.value, time_limit_s: Number(parts.limit.value) },
       {
