@@ -63,9 +63,9 @@ def everything(problem: Problem) -> float:
     return most * math.fsum(target.level for target in problem.targets if any(target.loadlist))
 
 
-def proof_answer(problem: Problem, proof: Proof | None) -> dict[str, Any] | None:
-    """Return what the algorithm knows, which says nothing of plans whose unloading is planned."""
-    if proof is None or problem.plans_unloading:
+def proof_answer(proof: Proof | None) -> dict[str, Any] | None:
+    """Return what the algorithm knows of plans that it has not found."""
+    if proof is None:
         return None
     return {"bound": proof.bound, "proven": proof.proven}
 

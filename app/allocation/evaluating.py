@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from app.allocation import bounding
 from app.allocation.answer_time import AnswerTime
 from app.allocation.explaining import account_of
 from app.allocation.legality import require_legal
 from app.domain.plan import Plan
-from app.domain.problem import Problem
 from app.domain.records import problem_from_record, problem_to_record, to_record
 from app.domain.warnings import problem_warnings
 from app.jobs.model import WorkResult
 from app.jobs.work_context import WorkContext
+from app.simulation.amounts import Amounts
 from app.simulation.mid_mission import remaining_at
 from app.solvers.stop import Deadline
 
@@ -27,8 +29,9 @@ def evaluate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     Parameters
     ----------
     payload
-        ``problem`` (a record), ``assignment``, ``bound_time_limit_s`` where a bound is asked for, and ``at``,
-        a clock, where the problem that remains then is.
+        ``problem`` (a record), ``assignment``, ``delivered`` and ``loaded`` where planned amounts are given,
+        ``bound_time_limit_s`` where a bound is asked for, and ``at``, a clock, where the problem that remains
+        then is.
     context
         Once it is cancelled, reasons are looked for no further.
 
@@ -44,18 +47,23 @@ def evaluate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     """
     problem = problem_from_record(payload["problem"])
     plan = Plan(tuple(map(tuple, payload["assignment"])))
-    require_legal(problem, plan, "/assignment")
-    fields = account_of(problem, plan, context.cancelled, _TIMES).fields
+    amounts = _amounts(payload)
+    require_legal(problem, plan, "/assignment", amounts)
+    fields = account_of(problem, plan, context.cancelled, _TIMES, amounts).fields
     limit = payload.get("bound_time_limit_s")
     at = payload.get("at")
     result = {
         **fields,
         "warnings": to_record(problem_warnings(problem)),
         **bounding.bound_answer(problem, fields["reward"], limit, Deadline(limit or 0.0)),
-        "remaining": None if at is None else _remaining(problem, plan, at),
+        "remaining": None if at is None else problem_to_record(remaining_at(problem, plan, at, amounts)),
     }
     return WorkResult(result)
 
 
-def _remaining(problem: Problem, plan: Plan, at: float) -> dict[str, Any]:
-    return problem_to_record(remaining_at(problem, plan, at))
+def _amounts(payload: dict[str, Any]) -> Amounts | None:
+    """Return the amounts that are given with a plan; reloads take nothing where theirs are not."""
+    if "delivered" not in payload:
+        return None
+    delivered = np.array(payload["delivered"], np.float64)
+    return Amounts(delivered, np.array(payload.get("loaded", np.zeros_like(delivered)), np.float64))

@@ -11,6 +11,7 @@ from app.allocation.answer_time import AnswerSize, AnswerTime
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.domain.records import to_record
+from app.simulation.amounts import Amounts
 from app.simulation.explain import explain
 
 REASONS, COMPLETE, PENDING = "reasons", "complete", "pending"
@@ -33,7 +34,13 @@ class Account:
     size: AnswerSize
 
 
-def account_of(problem: Problem, plan: Plan, hurry: Callable[[], bool], times: AnswerTime) -> Account:
+def account_of(
+    problem: Problem,
+    plan: Plan,
+    hurry: Callable[[], bool],
+    times: AnswerTime,
+    amounts: Amounts | None = None,
+) -> Account:
     """Replay a plan and write down what follows from it.
 
     Parameters
@@ -44,10 +51,12 @@ def account_of(problem: Problem, plan: Plan, hurry: Callable[[], bool], times: A
         Once it is true, reasons are looked for no further.
     times
         Told how long all that took.
+    amounts
+        What its stops unload and load, where that is planned; the best amounts by default.
     """
     watch = _Watch(hurry)
     begun = time.perf_counter()
-    allocation = explain(problem, plan, watch)
+    allocation = explain(problem, plan, watch, amounts)
     explained = time.perf_counter()
     fields: dict[str, Any] = to_record(allocation)
     written = time.perf_counter()

@@ -8,11 +8,13 @@ from typing import Any
 from app.domain.errors import IllegalPlan, Violation
 from app.domain.plan import Plan
 from app.domain.problem import Problem
+from app.simulation.amounts import Amounts
+from app.simulation.arrays import compile_problem
 from app.simulation.breaches import Breach, breaches_of
-from app.simulation.evaluation import reward_of
+from app.simulation.evaluation import replayed
 
 
-def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
+def require_legal(problem: Problem, plan: Plan, pointer: str, amounts: Amounts | None = None) -> None:
     """Refuse a plan that breaks a rule.
 
     Parameters
@@ -21,6 +23,8 @@ def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
         The problem, and the plan of it.
     pointer
         JSON pointer to the plan in the request.
+    amounts
+        What its stops unload and load, where that is planned; the best amounts by default.
 
     Raises
     ------
@@ -29,7 +33,7 @@ def require_legal(problem: Problem, plan: Plan, pointer: str) -> None:
         Where unloading is planned, with the first one.
     """
     if problem.plans_unloading:
-        reward_of(problem, plan)
+        replayed(problem, compile_problem(problem), plan.as_array(), amounts)
         return
     breaches = breaches_of(problem, plan)
     if not breaches:

@@ -163,7 +163,7 @@ def _result(problem: Problem, found: Found, payload: dict[str, Any], limit: Time
         "seed": payload["seed"],
         **account.fields,
         "warnings": to_record(problem_warnings(problem)),
-        "proof": bounding.proof_answer(problem, solution.proof),
+        "proof": bounding.proof_answer(solution.proof),
         **_bound(problem, account.fields["reward"], payload.get("bound_time_limit_s"), limit),
         "source_policy": None if source is None else asdict(source),
         "history": {"epoch": solution.history.epoch, "reward": solution.history.reward},

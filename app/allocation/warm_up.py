@@ -22,6 +22,7 @@ from app.allocation.answer_time import BOUND
 from app.domain.errors import IllegalPlan, NoCompatibleSource
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_to_record
+from app.domain.surroundings import Base
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
@@ -263,6 +264,16 @@ def _planned_reasons() -> None:
     tasks.allocate(_request(planned, "greedy", {}), _unlimited())
 
 
+def _reloads() -> None:
+    """Find reasons where there are bases; with planned loads, and with stocks that are refilled from."""
+    problem = _small_problem()
+    stocked = Base("base-1", 0.5, 0.5, stock=(1.0, 1.0))
+    refilled = replace(problem, bases=(stocked,))
+    objective = replace(problem.objective, unloading="planned", loading="planned")
+    for each in (refilled, replace(refilled, objective=objective)):
+        tasks.allocate(_request(each, "greedy", {}), _unlimited())
+
+
 def _combining() -> None:
     problem = _small_problem()
     problem = replace(problem, uavs=tuple(replace(u, loadlist=(9.0, 9.0)) for u in problem.uavs))
@@ -352,6 +363,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "planned unloading": _unloading,
     "reasons of planned unloading": _planned_reasons,
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
+    "reloads": _reloads,
     "combining": _combining,
     "bound": _bound,
     "geography": _geography,

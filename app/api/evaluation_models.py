@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -17,6 +17,9 @@ from app.api.allocation_models import (
 from app.api.problem_models import ProblemModel
 from app.api.wire_fields import Whole
 
+AmountsOfStops = list[list[list[Annotated[float, Field(allow_inf_nan=False)]] | None]]
+"""Amounts by step, UAV and material."""
+
 
 class EvaluationRequest(ProblemModel):
     """A problem, and a plan of it."""
@@ -25,6 +28,16 @@ class EvaluationRequest(ProblemModel):
         min_length=1,
         description="One joint action a step: for each UAV the index of its target, N for home, or N + 1 + d "
         "to reload at base d",
+    )
+    delivered: AmountsOfStops | None = Field(
+        default=None,
+        description="With planned unloading, what every visit unloads: by step, UAV and material, null for "
+        "nothing; default: the best amounts of the plan",
+    )
+    loaded: AmountsOfStops | None = Field(
+        default=None,
+        description="With planned loading, what every reload takes, likewise, below 0 for what it leaves "
+        "behind; it goes with `delivered`",
     )
     bound: bool = Field(
         default=False, description="Whether the answer has an upper bound on the reward of any plan"

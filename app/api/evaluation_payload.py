@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from app.api.evaluation_models import EvaluationRequest
+from app.api.evaluation_models import AmountsOfStops, EvaluationRequest
 from app.api.problem_models import to_problem
 from app.domain.errors import InvalidProblem, Violation
+from app.domain.problem import Problem
 from app.domain.records import problem_to_record
 from app.settings import Settings
 
@@ -18,7 +20,7 @@ def evaluation_payload(body: EvaluationRequest, settings: Settings) -> dict[str,
     ------
     ProblemTooLarge, InvalidProblem
         As :func:`app.api.problem_models.to_problem` does, or if the plan has rows of another length than the
-        swarm has UAVs.
+        swarm has UAVs, or amounts that do not fit it.
     """
     problem = to_problem(body, settings)
     violations = [
@@ -29,8 +31,65 @@ def evaluation_payload(body: EvaluationRequest, settings: Settings) -> dict[str,
     if violations:
         raise InvalidProblem.of(violations)
     payload: dict[str, Any] = {"problem": problem_to_record(problem), "assignment": body.assignment}
+    for name, amounts in _amounts(body, problem).items():
+        payload[name] = amounts
     if body.bound:
         payload["bound_time_limit_s"] = body.bound_time_limit_s
     if body.at is not None:
         payload["at"] = body.at
     return payload
+
+
+def _amounts(body: EvaluationRequest, problem: Problem) -> dict[str, list[list[list[float]]]]:
+    """Return the amounts that are given, as they are planned: all or none.
+
+    Raises
+    ------
+    InvalidProblem
+        If they are not planned, given one without the other, or in another shape than the plan.
+    """
+    given = {"delivered": body.delivered, "loaded": body.loaded}
+    planned = {"delivered": problem.plans_unloading, "loaded": problem.plans_loading}
+    violations = []
+    for name, amounts in given.items():
+        if amounts is not None and not planned[name]:
+            rule = "`objective.unloading`" if name == "delivered" else "`objective.loading`, with bases,"
+            violations.append(Violation(f"/{name}", f"amounts are given, and {rule} is not planned"))
+    if not violations and len({given[name] is None for name, asked in planned.items() if asked}) > 1:
+        missing = next(name for name in given if given[name] is None)
+        violations.append(
+            Violation(f"/{missing}", "`delivered` and `loaded` are given together, or neither is")
+        )
+    if not violations:
+        violations = [
+            each
+            for name, amounts in given.items()
+            if amounts is not None
+            for each in _misfits(name, amounts, body)
+        ]
+    if violations:
+        raise InvalidProblem.of(violations)
+    nothing = [0.0] * problem.n_materials
+    return {
+        name: [[each or nothing for each in row] for row in amounts]
+        for name, amounts in given.items()
+        if amounts is not None
+    }
+
+
+def _misfits(name: str, amounts: AmountsOfStops, body: EvaluationRequest) -> Iterator[Violation]:
+    """Yield where amounts have another shape than the plan, or are below 0 where nothing can be."""
+    materials, steps = len(body.uavs[0].loadlist), len(body.assignment)
+    if len(amounts) != steps:
+        yield Violation(f"/{name}", f"{len(amounts)} steps, but `assignment` has {steps}")
+    for s, row in enumerate(amounts):
+        if len(row) != len(body.uavs):
+            yield Violation(f"/{name}/{s}", f"amounts of {len(row)} UAVs, but there are {len(body.uavs)}")
+        for i, each in enumerate(row):
+            if each is not None and len(each) != materials:
+                yield Violation(
+                    f"/{name}/{s}/{i}", f"{len(each)} amounts, but there are {materials} materials"
+                )
+            for k, amount in enumerate(each or ()):
+                if amount < 0.0 and name == "delivered":
+                    yield Violation(f"/{name}/{s}/{i}/{k}", f"{amount:g} is less than 0")

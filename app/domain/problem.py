@@ -40,6 +40,7 @@ from app.domain.world_fields import JointActions
 
 Crs = Literal["local", "wgs84"]
 Unloading = Literal["greedy", "planned"]
+Loading = Literal["refill", "planned"]
 
 MAX_STEPS = 100
 """Largest number of decision steps a problem may ask for."""
@@ -248,6 +249,12 @@ class Objective:
         "unloads is decided with the plan, so that a UAV can keep material for a more urgent area",
         ALWAYS_RECORDED,
     ] = "greedy"
+    loading: Annotated[
+        Loading,
+        Choice(get_args(Loading)),
+        "refill: at a base a UAV takes what `full_load` says, as far as it is in stock. planned: what it "
+        "takes, at most its `capacity`, is decided with the plan; needs `unloading`: planned",
+    ] = "refill"
     half_life: Annotated[
         float | None,
         Number(low=MIN_MAGNITUDE, unit=TIME),
@@ -361,12 +368,13 @@ class Problem:
 
     @property
     def plans_unloading(self) -> bool:
-        """Whether how much a visit unloads is decided with the plan.
+        """Whether how much a visit unloads is decided with the plan."""
+        return self.objective.unloading == "planned"
 
-        With bases it is not yet, whatever the objective says: visits unload all that is needed and carried,
-        which is one of the plans that planned unloading allows.
-        """
-        return self.objective.unloading == "planned" and not self.bases
+    @property
+    def plans_loading(self) -> bool:
+        """Whether how much a reload takes is decided with the plan."""
+        return self.objective.loading == "planned" and bool(self.bases)
 
     @property
     def weights(self) -> tuple[float, ...]:

@@ -43,6 +43,8 @@ def _exclusions(problem: Problem) -> Rules:
                 yield f"/{name}", f"`{name}` and `matrices` exclude each other"
     if objective.half_life is not None and objective.unloading == "planned":
         yield "/objective/half_life", "`half_life` and `unloading`: planned exclude each other"
+    if objective.loading == "planned" and objective.unloading != "planned":
+        yield "/objective/loading", "`loading`: planned needs `unloading`: planned"
     if objective.change_weight > 0.0 and problem.start_plan is None:
         detail = f"{written(objective.change_weight)} needs a `start_plan`, and there is none"
         yield "/objective/change_weight", detail

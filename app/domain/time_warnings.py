@@ -58,6 +58,14 @@ def odd_times(problem: Problem) -> Iterator[Found]:
             if len(uav.committed) > problem.max_steps
         ],
     )
-    planned = problem.bases and problem.objective.unloading == "planned"
-    says = "with bases, visits unload all that is needed and carried, as greedy unloading does"
-    yield "planned_with_bases", [("/objective/unloading", says)] if planned else []
+    yield (
+        "no_capacity",
+        [
+            (
+                f"/uavs/{i}",
+                f"loading is planned, and {uav.id!r} has no `capacity`: it can take whatever is in stock",
+            )
+            for i, uav in enumerate(problem.uavs)
+            if problem.plans_loading and uav.capacity is None and not uav.ret
+        ],
+    )

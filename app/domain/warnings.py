@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from app.domain.geometry import EARTH_RADIUS_KM, distances, unrolled
 from app.domain.problem import TOLERANCE, Problem
-from app.domain.supplies import loads_later
+from app.domain.supplies import loads_later, most_loaded
 from app.domain.time_warnings import odd_times
 
 Floats = npt.NDArray[np.float64]
@@ -31,13 +31,13 @@ CODES = (
     "earliest_after_deadline",
     "far_point",
     "never_available",
+    "no_capacity",
     "no_level",
     "none_in_range",
     "not_carried",
     "not_needed",
     "nothing_needed",
     "one_place",
-    "planned_with_bases",
     "range_implausible",
     "range_spent",
     "speed_implausible",
@@ -146,7 +146,7 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
 
 
 def _scene(problem: Problem) -> _Scene:
-    uavs, targets = problem.uavs, problem.targets
+    uavs, targets, most = problem.uavs, problem.targets, most_loaded(problem)
     of_uavs = np.array(
         [
             (
@@ -157,9 +157,9 @@ def _scene(problem: Problem) -> _Scene:
                 u.voyage,
                 u.dis,
                 u.ret,
-                *(map(max, u.loadlist, loads_later(problem, u))),
+                *(map(max, u.loadlist, loads_later(problem, u, most[i]))),
             )
-            for u in uavs
+            for i, u in enumerate(uavs)
         ],
         dtype=np.float64,
     )

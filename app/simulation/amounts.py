@@ -1,6 +1,9 @@
-"""Amounts as an answer prints them: without the rounding errors of the sums that they come from."""
+"""Amounts of a plan, and how an answer prints them: without the rounding errors of sums."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +17,27 @@ _DIGITS = 9
 
 _ERROR = 1e-12
 """Rounding error of a sum of amounts, relative to the largest of them."""
+
+
+class Amounts(NamedTuple):
+    """What the stops of a plan of S' steps do.
+
+    Attributes
+    ----------
+    delivered
+        (S', M, K) what visits unload.
+    loaded
+        (S', M, K) what reloads take; what they leave behind where it is below 0.
+    """
+
+    delivered: Floats
+    loaded: Floats
+
+
+def stops_in_order(actions: Integers, n: int) -> Iterator[tuple[int, int, int]]:
+    """Yield step, UAV and action of every visit and reload, in the order of the plan."""
+    for s, i in np.argwhere(actions != n).tolist():
+        yield s, i, int(actions[s, i])
 
 
 def tidy(

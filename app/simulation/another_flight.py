@@ -8,7 +8,8 @@ import numpy as np
 
 from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
-from app.simulation.decorators import compiled
+from app.simulation.decorators import compiled, inlined
+from app.simulation.episodes import Episodes
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     GAIN,
@@ -103,6 +104,8 @@ def _look(
             rule = simulator.verdict(arrays, episodes, 0, i, base)
             if rule == visit.ALLOWED:
                 charge(trial.total, simulator.act(arrays, episodes, 0, i, base))
+                if arrays.terms[0].plans_loading:
+                    _load_for(arrays, plan, episodes, i, j)
                 rule = simulator.verdict(arrays, episodes, 0, i, j)
             if rule != visit.ALLOWED:
                 rules[rule + 1] += 1
@@ -125,6 +128,21 @@ def _look(
                 best[0], found[0], found[1] = change, i, d
     trial.total[GAIN] = 0.0
     return in_stock
+
+
+@inlined
+def _load_for(arrays: ProblemArrays, plan: FlownPlan, episodes: Episodes, i: int, j: int) -> None:
+    """Where loading is planned, take aboard what a target needs alone, as far as the capacity allows."""
+    room = arrays.uavs[0, i].capacity
+    for k in range(plan.spare.shape[1]):
+        room -= arrays.weights[0, k] * plan.spare[i, k]
+    for k in range(plan.spare.shape[1]):
+        had, weight = plan.spare[i, k], arrays.weights[0, k]
+        more = max(0.0, min(episodes.load[0, i, k], plan.remaining[j, k]) - had)
+        if weight > 0.0:
+            more = min(more, max(0.0, room) / weight)
+            room -= more * weight
+        episodes.load[0, i, k] = had + more
 
 
 @compiled

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.problem import ROUNDING, Problem
+from app.domain.supplies import most_loaded
 from app.simulation.columns import AREAS, BASES, TERMS, UAVS
 from app.simulation.homes import Homes, nearest_homes, usable_bases
 from app.simulation.legs import UNREACHABLE, LegArrays, leg_arrays
@@ -74,11 +75,14 @@ class ProblemArrays(NamedTuple):
     load
         (P, M, K) amounts carried.
     full
-        (P, M, K) amounts that it leaves a base with; those carried where there are no bases.
+        (P, M, K) amounts that it leaves a base with, at most where loading is planned; those carried where
+        there are no bases.
     bases
         (P, D) of :data:`~app.simulation.columns.BASES`.
     stock
         (P, D, K) amounts at the bases; infinite where there is as much as is asked for.
+    weights
+        (P, K) weight of a unit of each material.
     areas
         (P, N) of :data:`~app.simulation.columns.AREAS`.
     need
@@ -100,7 +104,7 @@ class ProblemArrays(NamedTuple):
     between_time: Annotated[Floats, Axes("CLL")]
     home_time: Annotated[Floats, Axes("ML")]
     kept_range: Annotated[Floats, Axes("ML")]
-    uavs: Annotated[Records, Axes("M", padding=(1.0, *(0.0,) * 8, 0, False, False))]
+    uavs: Annotated[Records, Axes("M", padding=(1.0, *(0.0,) * 9, 0, False, False))]
     committed: Annotated[Integers, Axes("MX", padding=-1)]
     before: Annotated[Integers, Axes("MX", padding=-1)]
     ret: Annotated[Flags, Axes("M", padding=True)]
@@ -108,6 +112,7 @@ class ProblemArrays(NamedTuple):
     full: Annotated[Floats, Axes("MX")]
     bases: Annotated[Records, Axes("D", padding=(0.0,))]
     stock: Annotated[Floats, Axes("DX")]
+    weights: Annotated[Floats, Axes("X")]
     areas: Annotated[Records, Axes("N", padding=(0.0, 0.0, 0.0, 0.0, np.inf, 0.0))]
     need: Annotated[Floats, Axes("NX")]
     requested: Annotated[Floats, Axes("NX")]
@@ -168,7 +173,7 @@ def _compile(problem: Problem) -> _Compiled:
     uavs, targets, objective = problem.uavs, problem.targets, problem.objective
     need = np.array([t.need for t in targets], dtype=np.float64)
     load = np.array([u.loadlist for u in uavs], dtype=np.float64)
-    full = np.array([u.full for u in uavs], dtype=np.float64) if problem.bases else load
+    full = np.array(most_loaded(problem), dtype=np.float64) if problem.bases else load
     unlimited = (np.inf,) * problem.n_materials
     stock = np.array([unlimited if base.stock is None else base.stock for base in problem.bases], np.float64)
     requested = np.array(
@@ -188,6 +193,7 @@ def _compile(problem: Problem) -> _Compiled:
     terms["crumb"] = ROUNDING * max(load.max(), full.max(), requested.max())
     terms["return_to_base"], terms["charge_return"] = objective.return_to_base, objective.charge_return
     terms["timed"], terms["in_wind"], terms["metric"] = legs.timed, legs.in_wind, legs.metric
+    terms["plans_loading"] = problem.plans_loading
     arrays = ProblemArrays(
         start_target=legs.start_target[None],
         between=legs.between[None],
@@ -204,6 +210,7 @@ def _compile(problem: Problem) -> _Compiled:
         full=full[None],
         bases=np.array([(base.turnaround,) for base in problem.bases], BASES)[None],
         stock=stock.reshape(1, problem.n_bases, problem.n_materials),
+        weights=np.array([problem.weights], dtype=np.float64),
         areas=_areas(problem, need, beyond, bonus)[None],
         need=need[None],
         requested=requested[None],
@@ -222,6 +229,9 @@ def _uavs(problem: Problem, legs: LegArrays) -> Records:
     columns["ready"], columns["airborne"] = [u.available_from for u in uavs], [u.airborne for u in uavs]
     columns["until"] = [np.inf if u.available_until is None else u.available_until for u in uavs]
     columns["endurance"] = [np.inf if u.endurance is None else u.endurance * (1.0 - u.reserve) for u in uavs]
+    # It counts nowhere else, so that UAVs which differ in it alone are alike.
+    limits = [u.capacity if problem.plans_loading else None for u in uavs]
+    columns["capacity"] = [np.inf if limit is None else limit for limit in limits]
     columns["watched"] = np.isfinite(columns["until"]) | np.isfinite(columns["endurance"])
     columns["on_ground"] = [u.begins_on_ground for u in uavs]
     columns["start_home"], columns["start_home_time"] = legs.start_home, legs.start_home_time

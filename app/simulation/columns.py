@@ -21,6 +21,7 @@ TERMS = np.dtype(
         ("timed", "?"),
         ("in_wind", "?"),
         ("metric", "?"),
+        ("plans_loading", "?"),
     ],
     align=True,
 )
@@ -42,6 +43,8 @@ in_wind
     Whether the air length of a leg is time · speed, not the length over ground.
 metric
     Whether no way over a third place is shorter, or takes less time, than the leg itself.
+plans_loading
+    Whether what a reload takes is decided with the plan.
 """
 
 UAVS = np.dtype(
@@ -53,6 +56,7 @@ UAVS = np.dtype(
         ("until", "f8"),
         ("airborne", "f8"),
         ("endurance", "f8"),
+        ("capacity", "f8"),
         ("start_home", "f8"),
         ("start_home_time", "f8"),
         ("leg_class", "i8"),
@@ -68,6 +72,8 @@ speed, dis
 voyage, endurance
     Range, and time that it may be in the air, without what has to be left after landing; the latter is
     infinite where there is no limit.
+capacity
+    Most weight that it leaves a base with, where loading is planned; infinite where there is no limit.
 ready, until
     Its clock at the start, and the latest time to have landed; infinite where there is none.
 airborne

@@ -27,25 +27,28 @@ from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.domain.world_use import uses_world
 from app.simulation import simulator, visit
-from app.simulation.amounts import tidy
+from app.simulation.amounts import Amounts, tidy
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem, homes_of
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
 from app.simulation.evaluation import replayed
 from app.simulation.homes import AT_START
-from app.simulation.replay import Replay, deliver
+from app.simulation.replay import Replay, deliver, load
 from app.simulation.unmet import unmet_targets
 from app.simulation.ways import Ways
 
 
-def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: False) -> Allocation:
+def explain(
+    problem: Problem,
+    plan: Plan,
+    hurry: Callable[[], bool] = lambda: False,
+    amounts: Amounts | None = None,
+) -> Allocation:
     """Replay a plan and write down everything that follows from it.
 
     The answer is a :class:`~app.domain.allocation.TimedAllocation` where the problem uses anything of the
     world (:func:`~app.domain.world_use.uses_world`), and a :class:`~app.domain.allocation.SortieAllocation`
     where it has bases.
-
-    With planned unloading the deliveries are the best ones for the plan's routes.
 
     Parameters
     ----------
@@ -54,6 +57,8 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     hurry
         Asked every few milliseconds; once it is true, reasons for unmet needs are found out no further than
         is quick. What the plan does is always complete.
+    amounts
+        What its stops unload and load, where that is planned; the best amounts by default.
 
     Raises
     ------
@@ -61,7 +66,7 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
         If one of its actions is not allowed; ``details`` has step (from 1), uav_id and rule.
     """
     arrays, actions = compile_problem(problem), plan.as_array()
-    result, trace, episodes = _traced(problem, arrays, actions)
+    result, trace, episodes = _traced(problem, arrays, actions, amounts)
     world = uses_world(problem)
     routes = _timed_routes(problem, actions, trace, episodes) if world else _routes(problem, actions, trace)
     allocation = Allocation(
@@ -71,7 +76,9 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
         distance=float(result.distance[0]),
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
-        unmet=unmet_targets(problem, arrays, actions, trace.delivered, episodes.need[0], hurry),
+        unmet=unmet_targets(
+            problem, arrays, actions, Amounts(trace.delivered, trace.loaded), episodes.need[0], hurry
+        ),
     )
     if not world:
         return allocation
@@ -85,7 +92,7 @@ def explain(problem: Problem, plan: Plan, hurry: Callable[[], bool] = lambda: Fa
     return SortieAllocation(**_values(timed), bases=tuple(bases))
 
 
-def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
+def timed_routes(problem: Problem, plan: Plan, amounts: Amounts | None = None) -> tuple[LandingRoute, ...]:
     """Return what every UAV does in a plan, with all times, whatever the problem uses of the world.
 
     Raises
@@ -94,20 +101,22 @@ def timed_routes(problem: Problem, plan: Plan) -> tuple[LandingRoute, ...]:
         As :func:`explain` does.
     """
     arrays, actions = compile_problem(problem), plan.as_array()
-    _, trace, episodes = _traced(problem, arrays, actions)
+    _, trace, episodes = _traced(problem, arrays, actions, amounts)
     return tuple(_timed_routes(problem, actions, trace, episodes))
 
 
-def _traced(problem: Problem, arrays: ProblemArrays, actions: Actions) -> tuple[Replay, Trace, Episodes]:
+def _traced(
+    problem: Problem, arrays: ProblemArrays, actions: Actions, amounts: Amounts | None
+) -> tuple[Replay, Trace, Episodes]:
     """Replay a plan, and trace it.
 
     No UAV is sent home in the trace: at its end every one is still at its last stop, which is where the leg
     home begins and where one more visit would begin.
     """
-    result, given = replayed(problem, arrays, actions)
+    result, given = replayed(problem, arrays, actions, amounts)
     episodes = simulator.new_episodes(arrays, 1)
     trace = _new_trace(actions, problem.n_materials, given)
-    _trace(arrays, episodes, actions, given is not None, trace)
+    _trace(arrays, episodes, actions, given is not None, given is not None and problem.plans_loading, trace)
     tidy(arrays, actions, trace.delivered, trace.loaded, episodes.need[0], episodes.stock[0])
     return result, trace, episodes
 
@@ -231,8 +240,8 @@ class Trace(NamedTuple):
     return_times: Floats
 
 
-def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> Trace:
-    """Make room for a trace; deliveries that are planned are in it already."""
+def _new_trace(actions: Actions, n_materials: int, given: Amounts | None) -> Trace:
+    """Make room for a trace; amounts that are planned are in it already."""
     shape, m = actions.shape, actions.shape[1]
     return Trace(
         legs=np.zeros(shape),
@@ -241,18 +250,21 @@ def _new_trace(actions: Actions, n_materials: int, delivered: Floats | None) -> 
         departures=np.zeros(shape),
         flown=np.zeros(shape),
         aloft=np.zeros(shape),
-        delivered=np.zeros((*shape, n_materials)) if delivered is None else delivered,
-        loaded=np.zeros((*shape, n_materials)),
+        delivered=np.zeros((*shape, n_materials)) if given is None else given.delivered.copy(),
+        loaded=np.zeros((*shape, n_materials)) if given is None else given.loaded.copy(),
         return_legs=np.zeros(m),
         return_times=np.zeros(m),
     )
 
 
 @compiled
-def _trace(arrays: ProblemArrays, episodes: Episodes, actions: Actions, planned: bool, trace: Trace) -> None:
+def _trace(
+    arrays: ProblemArrays, episodes: Episodes, actions: Actions, planned: bool, loading: bool, trace: Trace
+) -> None:
     """Fly the stops of a legal plan, and write down what each does, then the legs home.
 
-    Deliveries are written down too, unless they are planned: then the trace has them.
+    Amounts are written down too, unless they are planned: then the trace has them. `planned` is about
+    deliveries, `loading` about loads.
     """
     for s in range(actions.shape[0]):
         for i in range(actions.shape[1]):
@@ -263,6 +275,10 @@ def _trace(arrays: ProblemArrays, episodes: Episodes, actions: Actions, planned:
             time = visit.leg_time(arrays, 0, i, episodes.at[0, i], j, length)
             trace.legs[s, i], trace.arrivals[s, i] = length, episodes.clock[0, i] + time
             if visit.is_base(arrays, j):
+                if loading:
+                    load(arrays, episodes, i, j, trace.loaded, s)
+                    trace.departures[s, i] = episodes.clock[0, i]
+                    continue
                 for k in range(trace.loaded.shape[2]):
                     trace.loaded[s, i, k] = visit.loaded_of(
                         episodes.load[0, i, k],

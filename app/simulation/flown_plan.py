@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from app.simulation import simulator
+from app.simulation.amounts import Amounts
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
-from app.simulation.deliveries import Visits, visits_of
 from app.simulation.episodes import Episodes
-from app.simulation.replay import deliver
+from app.simulation.replay import deliver, load
 from app.simulation.visit import is_base
+from app.simulation.visit_lists import Visits, visits_of
 
 
 class FlownPlan(NamedTuple):
@@ -55,17 +56,17 @@ class FlownPlan(NamedTuple):
     stock: Floats
 
 
-def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, planned: bool) -> FlownPlan:
+def record_plan(arrays: ProblemArrays, actions: Integers, amounts: Amounts, planned: bool) -> FlownPlan:
     """Fly a legal plan and write down what one more visit would meet.
 
     Parameters
     ----------
     arrays
         A stack of one problem.
-    actions, delivered
-        (S', M) joint actions and (S', M, K) what they unload.
+    actions, amounts
+        (S', M) joint actions, and what they unload and load.
     planned
-        Whether these amounts are to be unloaded, not the simulator's own.
+        Whether these amounts are to be unloaded, not the simulator's own; and loaded, where that is planned.
     """
     m, n, k = arrays.shape
     steps = int((actions != n).sum(axis=0).max()) + 1
@@ -85,14 +86,12 @@ def record_plan(arrays: ProblemArrays, actions: Integers, delivered: Floats, pla
         episodes.load[0],
         episodes.stock[0],
     )
-    _fly(arrays, episodes, plan, delivered, planned)
+    _fly(arrays, episodes, plan, amounts, planned)
     return plan
 
 
 @compiled
-def _fly(
-    arrays: ProblemArrays, episodes: Episodes, plan: FlownPlan, delivered: Floats, planned: bool
-) -> None:
+def _fly(arrays: ProblemArrays, episodes: Episodes, plan: FlownPlan, amounts: Amounts, planned: bool) -> None:
     m, materials = plan.load.shape[0], plan.load.shape[2]
     visits = plan.visits
     for s in range(plan.leg.shape[1]):
@@ -112,9 +111,12 @@ def _fly(
                 else:
                     plan.need[i, s, k] = episodes.need[0, j, k]
             plan.leg[i, s] = simulator.leg_to(arrays, episodes, 0, i, j)
-            if planned:
+            if planned and is_base(arrays, j) and arrays.terms[0].plans_loading:
+                load(arrays, episodes, i, j, amounts.loaded, s)
+                plan.value[i, s] = -arrays.terms[0].weight * plan.leg[i, s]
+            elif planned and not is_base(arrays, j):
                 before = episodes.satisfaction[0]
-                deliver(arrays, episodes, i, j, delivered, s)
+                deliver(arrays, episodes, i, j, amounts.delivered, s)
                 plan.value[i, s] = episodes.satisfaction[0] - before - arrays.terms[0].weight * plan.leg[i, s]
             else:
                 plan.value[i, s] = simulator.act(arrays, episodes, 0, i, j)

@@ -12,14 +12,18 @@ from app.domain.allocation import LandingRoute, LandingSomewhere, Reload, TimedS
 from app.domain.plan import Plan
 from app.domain.problem import ROUNDING, UAV, Problem, Target
 from app.domain.surroundings import Base
+from app.simulation.amounts import Amounts
+from app.simulation.arrays import compile_problem
 from app.simulation.breaches import breaches_of
+from app.simulation.evaluation import replay_at_best
 from app.simulation.explain import timed_routes
 from app.simulation.legs import wind_of, zones_of
+from app.simulation.visit import ALLOWED
 from app.travel.choice import legs_between
 from app.travel.legs import Legs, Way
 
 
-def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
+def remaining_at(problem: Problem, plan: Plan, at: float, amounts: Amounts | None = None) -> Problem:
     """Return the problem as it stands at a clock of a plan, ready to be allocated (section 11).
 
     A UAV between two places is on its way, and committed to the visit that it is flying to; with matrices it
@@ -33,13 +37,15 @@ def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
         The problem and a legal plan of it.
     at
         On the clock of the problem.
+    amounts
+        What the plan's stops unload and load, where that is planned; the best amounts by default.
 
     Raises
     ------
     IllegalPlan
         If the plan is not legal.
     """
-    routes = timed_routes(problem, plan)
+    routes = timed_routes(problem, plan, amounts)
     n = problem.n_targets
     targets = {target.id: j for j, target in enumerate(problem.targets)}
     bases = {base.id: n + 1 + d for d, base in enumerate(problem.bases)}
@@ -49,10 +55,10 @@ def remaining_at(problem: Problem, plan: Plan, at: float) -> Problem:
     for flight in flights:
         for stop in flight.begun:
             if isinstance(stop, Reload):
-                less, sign, amounts = taken[bases[stop.base_id] - n - 1], 1.0, stop.loaded
+                less, sign, moved = taken[bases[stop.base_id] - n - 1], 1.0, stop.loaded
             else:
-                less, sign, amounts = needs[targets[stop.target_id]], -1.0, stop.delivered
-            for k, amount in enumerate(amounts):
+                less, sign, moved = needs[targets[stop.target_id]], -1.0, stop.delivered
+            for k, amount in enumerate(moved):
                 less[k] += sign * amount
     rests = [
         [bases[stop.base_id] if isinstance(stop, Reload) else targets[stop.target_id] for stop in flight.rest]
@@ -74,15 +80,28 @@ def _legal_rest(problem: Problem, rests: list[list[int]]) -> tuple[tuple[int, ..
     Steps count anew, so UAVs may come to a target in another order: a visit that is left without anything to
     unload is left out.
     """
-    home, ids = problem.n_targets, {uav.id: i for i, uav in enumerate(problem.uavs)}
+    home = problem.n_targets
     while True:
         steps = max(1, *map(len, rests))
         rows = tuple(tuple(rest[s] if s < len(rest) else home for rest in rests) for s in range(steps))
-        broken = breaches_of(problem, Plan(rows)) if not problem.plans_unloading else []
-        if not broken:
+        broken = _first_broken(problem, rows)
+        if broken is None:
             return rows
-        first = broken[0]
-        del rests[ids[str(first.uav_id)]][first.step - 1]
+        s, i = broken
+        del rests[i][s]
+
+
+def _first_broken(problem: Problem, rows: tuple[tuple[int, ...], ...]) -> tuple[int, int] | None:
+    """Return step and UAV of the first action that is not allowed; None for a legal plan."""
+    if problem.plans_unloading:
+        result, _ = replay_at_best(compile_problem(problem), np.array(rows, np.int64), True)
+        legal = result.rule[0] == ALLOWED
+        return None if legal else (int(result.step[0]), int(result.uav[0]))
+    broken = breaches_of(problem, Plan(rows))
+    if not broken:
+        return None
+    ids = [uav.id for uav in problem.uavs]
+    return broken[0].step - 1, ids.index(str(broken[0].uav_id))
 
 
 def _with_need(target: Target, need: Sequence[float]) -> Target:
@@ -207,11 +226,13 @@ class _Flight:
         whole = map(max, before.loadlist, before.full)
         change = stop.loaded if isinstance(stop, Reload) else tuple(-amount for amount in stop.delivered)
         left = tuple(
-            have + more if have + more >= ROUNDING * all_of else 0.0
+            have + more if have + more > 0.0 and have + more >= ROUNDING * max(have, all_of) else 0.0
             for have, more, all_of in zip(uav.loadlist, change, whole, strict=True)
         )
-        # What it leaves a base with is what it had at first, where nothing else is said.
-        return replace(uav, loadlist=left, full_load=before.full if self._problem.bases else before.full_load)
+        # What it leaves a base with is what it had at first, where nothing else is said; or what is planned.
+        refills = self._problem.bases and not self._problem.plans_loading
+        full = before.full_load if not self._problem.bases else before.full if refills else None
+        return replace(uav, loadlist=left, full_load=full)
 
     def _at_place(self, uav: UAV, target: _Place | None, clock: float, flown: float, aloft: float) -> UAV:
         """Return the UAV at a target or base, or at its starting point."""

@@ -75,6 +75,15 @@ class Places(NamedTuple):
     blocked: Integers
 
 
+def no_places() -> Places:
+    """Begin a look."""
+    return Places(
+        np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
+        np.full(2, NONE, np.int64), np.zeros(2, np.int64), np.full(2, -np.inf), np.zeros(1, np.int64),
+        np.array([NONE, 0, 0]),
+    )  # fmt: skip
+
+
 class Lookout:
     """Looks at every place for one more visit, for one target after the other, as long as there is time.
 
@@ -120,11 +129,7 @@ class Lookout:
             float(start.arrival[j]), float(self._arrays.areas["deadline"][0, j])
         ):
             comers = _IN_TIME if start.able[j] < 0 else _ABLE
-        found = Places(
-            np.full(AS_IS + 1, NONE, np.int64), np.zeros(AS_IS + 1, np.int64), np.full(AS_IS + 1, -np.inf),
-            np.full(2, NONE, np.int64), np.zeros(2, np.int64), np.full(2, -np.inf), np.zeros(1, np.int64),
-            np.array([NONE, 0, 0]),
-        )  # fmt: skip
+        found = no_places()
         i = 0
         while True:
             i = _look(

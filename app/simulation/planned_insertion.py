@@ -15,13 +15,14 @@ from app.domain.problem import ROUNDING
 from app.simulation import simulator, visit, worth
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled, inlined
-from app.simulation.deliveries import Unloading, Visits, new_unloading, serve, visits_of
+from app.simulation.deliveries import Unloading, new_unloading, serve
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.insertion import (
     CHANGED,
     GAIN,
     HELPS,
     MADE,
+    MARK,
     TURNOVER,
     WORK,
     Trial,
@@ -30,7 +31,7 @@ from app.simulation.insertion import (
     exchange,
     gain,
 )
-from app.simulation.visit_lists import connected, move_slot
+from app.simulation.visit_lists import Visits, move_slot, visits_of
 
 ONLY_LOOK = -2
 """In place of a place: what the visit adds is worked out, and no more."""
@@ -205,7 +206,7 @@ def _amounts_anew(
         visits.target[i, length] = j
         move_slot(visits, length * m + i, NONE, j)
         visits.length[i] += 1
-    count = connected(
+    count = _connected(
         visits,
         plan.visits.target,
         unloading,
@@ -323,3 +324,62 @@ def _charge_way(
     if arrays.terms[0].charge_return and at != before:
         now = visit.way_home(arrays, 0, h, at)
         exchange(total, -worth.cost_of(arrays, 0, back[h]), -worth.cost_of(arrays, 0, now))
+
+
+@compiled
+def _connected(
+    visits: Visits,
+    routes: Integers,
+    unloading: Unloading,
+    uav_mark: Integers,
+    target_mark: Integers,
+    changed: Integers,
+    tally: Integers,
+    i: int,
+    j: int,
+) -> int:
+    """List the targets that visits connect with the additional one, by their rank, and their UAVs."""
+    served, order, rank = unloading.served, unloading.order, unloading.rank
+    tally[MARK] += 1
+    mark = tally[MARK]
+    m = visits.length.shape[0]
+    served[0], target_mark[j] = j, mark
+    changed[0], uav_mark[i] = i, mark
+    uavs, found, seen, head = 1, 1, 0, 0
+    while True:
+        # First the routes of all UAVs that are known, then the UAVs of all targets that are known.
+        while seen < uavs:
+            h = changed[seen]
+            for s in range(visits.length[h]):
+                # What the plan has in a visit that is given up is concerned, too; the last one is additional.
+                x = visits.target[h, s] if h != i or s == visits.length[h] - 1 else routes[h, s]
+                if target_mark[x] != mark:
+                    target_mark[x] = mark
+                    served[found] = x
+                    found += 1
+            seen += 1
+        if head == found:
+            break
+        slot = visits.first[served[head]]
+        while slot != NONE:
+            if uav_mark[slot % m] != mark:
+                uav_mark[slot % m] = mark
+                changed[uavs] = slot % m
+                uavs += 1
+            slot = visits.following[slot]
+        head += 1
+    tally[CHANGED] = uavs
+    if found * found > order.shape[0]:
+        q = 0
+        for position in range(order.shape[0]):
+            if target_mark[order[position]] == mark:
+                served[q] = order[position]
+                q += 1
+        return found
+    for q in range(1, found):
+        x, position = served[q], q
+        while position > 0 and rank[served[position - 1]] > rank[x]:
+            served[position] = served[position - 1]
+            position -= 1
+        served[position] = x
+    return found

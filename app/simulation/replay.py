@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.problem import TOLERANCE
+from app.simulation.amounts import Amounts
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
@@ -16,13 +17,25 @@ from app.simulation.simulator import (
     changes_of,
     close,
     fly_to,
+    fly_to_base,
     makespan_of,
     reach_verdict,
     reset_one,
     unload,
     verdict,
 )
-from app.simulation.visit import ALLOWED, NO_SUCH_ACTION, RETURNING, TOO_MANY_STEPS, TOO_MUCH, UNLOADS_NOTHING
+from app.simulation.visit import (
+    ALLOWED,
+    NO_SUCH_ACTION,
+    NOT_IN_STOCK,
+    RETURNING,
+    TOO_HEAVY,
+    TOO_MANY_STEPS,
+    TOO_MUCH,
+    UNLOADS_NOTHING,
+    farthest,
+    most_carried,
+)
 from app.simulation.worth import closing_cost, has_closing_cost
 
 
@@ -59,11 +72,12 @@ def replay(arrays: ProblemArrays, plans: Integers, problem: Integers) -> Replay:
     problem
         (B,) each plan's problem in the stack.
     """
-    return _replay(arrays, plans, problem, np.empty((0, 0, 0, 0)))
+    none = np.empty((0, 0, 0, 0))
+    return _replay(arrays, plans, problem, none, none)
 
 
-def replay_delivering(arrays: ProblemArrays, plan: Integers, delivered: Floats) -> Replay:
-    """Replay a plan of the first problem of a stack whose deliveries are given (section 3a).
+def replay_with(arrays: ProblemArrays, plan: Integers, amounts: Amounts) -> Replay:
+    """Replay a plan of the first problem of a stack whose amounts are given (sections 3a and 9).
 
     Parameters
     ----------
@@ -71,18 +85,21 @@ def replay_delivering(arrays: ProblemArrays, plan: Integers, delivered: Floats) 
         The stack of problems.
     plan
         (S, M) actions.
-    delivered
-        (S, M, K) what every visit unloads.
+    amounts
+        What every visit unloads and, where that is planned, what every reload takes.
     """
-    return _replay(arrays, plan[None], np.zeros(1, np.int64), delivered[None])
+    loaded = amounts.loaded[None] if arrays.terms["plans_loading"][0] else np.empty((0, 0, 0, 0))
+    return _replay(arrays, plan[None], np.zeros(1, np.int64), amounts.delivered[None], loaded)
 
 
 @njit(cache=True, error_model="numpy")
-def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered: Floats) -> Replay:
-    """Replay plans: those of the first problem, with what every visit unloads, where that is given."""
+def _replay(
+    arrays: ProblemArrays, plans: Integers, problem: Integers, delivered: Floats, loaded: Floats
+) -> Replay:
+    """Replay plans: those of the first problem, with what stops unload and take, where it is given."""
     batch, steps, m = plans.shape
     n, k = arrays.need.shape[1], arrays.need.shape[2]
-    planned = delivered.shape[0] > 0
+    planned, loading = delivered.shape[0] > 0, loaded.shape[0] > 0
     result = Replay(
         np.zeros(batch), np.zeros(batch), np.zeros(batch), np.zeros(batch), np.zeros(batch),
         np.zeros(batch, np.int64), np.zeros(batch, np.int64), np.zeros(batch, np.int64),
@@ -107,6 +124,8 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
                     rule = NO_SUCH_ACTION
                 elif action < n and planned:
                     rule = delivery_verdict(arrays, state, i, action, delivered[b], s)
+                elif action > n and loading:
+                    rule = load_verdict(arrays, state, i, action, loaded[b], s)
                 elif action != n:
                     rule = verdict(arrays, state, 0, i, action)
                 if rule != ALLOWED:
@@ -114,6 +133,8 @@ def _replay(arrays: ProblemArrays, plans: Integers, problem: Integers, delivered
                     break
                 if planned and action < n:
                     deliver(arrays, state, i, action, delivered[b], s)
+                elif loading and action > n:
+                    load(arrays, state, i, action, loaded[b], s)
                 else:
                     act(arrays, state, 0, i, action)
             s += 1
@@ -139,11 +160,12 @@ def delivery_verdict(
     useful = False
     for k in range(delivered.shape[2]):
         amount = delivered[s, i, k]
-        if not 0.0 <= amount <= (1.0 + TOLERANCE) * min(arrays.load[0, i, k], arrays.need[0, j, k]):
+        whole = most_carried(arrays, 0, i, k)
+        if not 0.0 <= amount <= (1.0 + TOLERANCE) * min(whole, arrays.need[0, j, k]):
             return TOO_MUCH
         # Amounts that add up to all there is may exceed it by their rounding.
         if (
-            amount > episodes.load[0, i, k] + TOLERANCE * arrays.load[0, i, k]
+            amount > episodes.load[0, i, k] + TOLERANCE * whole
             or amount > episodes.need[0, j, k] + TOLERANCE * arrays.need[0, j, k]
         ):
             return TOO_MUCH
@@ -158,3 +180,33 @@ def deliver(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, delivered
     for k in range(delivered.shape[2]):
         if delivered[s, i, k] > 0.0:
             episodes.satisfaction[0] += unload(arrays, episodes, 0, i, j, k, delivered[s, i, k])
+
+
+@compiled
+def load_verdict(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, loaded: Floats, s: int) -> int:
+    """As :func:`verdict` for episode 0, where the reload of step `s` is to take ``loaded[s, i]``."""
+    if episodes.ret[0, i]:
+        return RETURNING
+    d, weight = j - arrays.need.shape[1] - 1, 0.0
+    for k in range(loaded.shape[2]):
+        amount, stock = loaded[s, i, k], episodes.stock[0, d, k]
+        whole = max(most_carried(arrays, 0, i, k), arrays.stock[0, d, k])
+        if amount > stock and amount - stock > TOLERANCE * whole:
+            return NOT_IN_STOCK
+        if amount < 0.0 and -amount - episodes.load[0, i, k] > TOLERANCE * most_carried(arrays, 0, i, k):
+            return TOO_MUCH
+        weight += arrays.weights[0, k] * (episodes.load[0, i, k] + amount)
+    if weight > farthest(arrays.uavs[0, i].capacity):
+        return TOO_HEAVY
+    return reach_verdict(arrays, episodes, 0, i, j)
+
+
+@compiled
+def load(arrays: ProblemArrays, episodes: Episodes, i: int, j: int, loaded: Floats, s: int) -> None:
+    """Let UAV `i` of episode 0 make the allowed reload of step `s`, which takes ``loaded[s, i]``."""
+    d = j - arrays.need.shape[1] - 1
+    fly_to_base(arrays, episodes, 0, i, j)
+    for k in range(loaded.shape[2]):
+        amount = loaded[s, i, k]
+        episodes.load[0, i, k] = max(0.0, episodes.load[0, i, k] + amount)
+        episodes.stock[0, d, k] = max(0.0, episodes.stock[0, d, k] - amount)

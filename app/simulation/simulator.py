@@ -232,18 +232,26 @@ def earned_now(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int
 def reload(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
     """Land UAV `i` at base `j`, let it reload, and return what that earns, 0 or less (section 9)."""
     p, d = episodes.problem[b], j - arrays.need.shape[1] - 1
-    length = leg(arrays, p, i, episodes.at[b, i], j)
-    arrival = episodes.clock[b, i] + leg_time(arrays, p, i, episodes.at[b, i], j, length)
-    episodes.clock[b, i] = departure_after(arrays, p, j, arrival)
-    episodes.flown[b, i], episodes.aloft[b, i] = 0.0, 0.0
-    episodes.at[b, i] = j
-    episodes.visits[b, i] += 1
-    episodes.distance[b] += length
+    length = fly_to_base(arrays, episodes, b, i, j)
     for k in range(episodes.load.shape[2]):
         loaded = loaded_of(episodes.load[b, i, k], arrays.full[p, i, k], episodes.stock[b, d, k])
         episodes.load[b, i, k] += loaded
         episodes.stock[b, d, k] -= loaded
     return -cost_of(arrays, p, length)
+
+
+@compiled
+def fly_to_base(arrays: ProblemArrays, episodes: Episodes, b: int, i: int, j: int) -> float:
+    """Take UAV `i` to base `j` and through its turnaround; return the leg's length."""
+    p, at = episodes.problem[b], episodes.at[b, i]
+    length = leg(arrays, p, i, at, j)
+    arrival = episodes.clock[b, i] + leg_time(arrays, p, i, at, j, length)
+    episodes.clock[b, i] = departure_after(arrays, p, j, arrival)
+    episodes.flown[b, i], episodes.aloft[b, i] = 0.0, 0.0
+    episodes.at[b, i] = j
+    episodes.visits[b, i] += 1
+    episodes.distance[b] += length
+    return length
 
 
 @merged

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.domain.allocation import Relaxation, Unmet, UnmetCode
 from app.domain.problem import Problem
+from app.simulation.amounts import Amounts
 from app.simulation.another_flight import NO_STEPS, another_flight
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
@@ -26,6 +27,7 @@ from app.simulation.legs import UNREACHABLE
 from app.simulation.openings import AS_IS, Lookout, Places
 from app.simulation.planned_insertion import new_planned_trial
 from app.simulation.shortfalls import RANGE, STEP, TIME
+from app.simulation.spare_visits import SpareLookout
 from app.simulation.unmet_wording import Wording
 from app.simulation.visit import (
     COMMITTED_ELSEWHERE,
@@ -52,7 +54,7 @@ def unmet_targets(
     problem: Problem,
     arrays: ProblemArrays,
     actions: Integers,
-    delivered: Floats,
+    amounts: Amounts,
     needs: Floats,
     hurry: Callable[[], bool],
 ) -> tuple[Unmet, ...]:
@@ -62,24 +64,29 @@ def unmet_targets(
     ----------
     problem, arrays
         The problem, and the same as a stack of one.
-    actions, delivered
-        (S', M) joint actions and (S', M, K) what they unload.
+    actions, amounts
+        (S', M) joint actions, and what they unload and load.
     needs
         (N, K) what is still needed at the end, as it is to be printed.
     hurry
         Once it is true, nothing more is looked at.
     """
     planned = problem.plans_unloading
-    plan = record_plan(arrays, actions, delivered, planned)
+    plan = record_plan(arrays, actions, amounts, planned)
     open_targets = np.flatnonzero(plan.remaining.max(axis=1) > 0)
     if not len(open_targets):
         return ()
     share = plan.remaining[open_targets].sum(axis=1) / arrays.areas["need_total"][0, open_targets]
     urgent = open_targets[np.argsort(-arrays.areas["level"][0, open_targets] * share, kind="stable")]
-    scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
     start = look_from_start(arrays, plan, open_targets)
-    lookout = Lookout(arrays, plan, *scratch, hurry)
-    counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
+    lookout: Lookout | SpareLookout
+    counterfactuals: Counterfactuals | SpareLookout
+    if planned and problem.bases:
+        lookout = counterfactuals = SpareLookout(arrays, plan, actions, amounts, hurry)
+    else:
+        scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None
+        lookout = Lookout(arrays, plan, *scratch, hurry)
+        counterfactuals = Counterfactuals(problem, arrays, plan, *scratch)
     judge = _Evaluator(problem, arrays, plan, needs, start, lookout, counterfactuals)
     # All of them first have a reason without looking, so that a look can end anywhere.
     found = {j: judge.at_once(j) for j in open_targets.tolist()}
@@ -112,8 +119,8 @@ class _Evaluator:
         plan: FlownPlan,
         needs: Floats,
         start: Start,
-        lookout: Lookout,
-        counterfactuals: Counterfactuals,
+        lookout: Lookout | SpareLookout,
+        counterfactuals: Counterfactuals | SpareLookout,
     ) -> None:
         self._problem, self._arrays, self._plan, self._start = problem, arrays, plan, start
         self._needs, self._lookout, self._counterfactuals = needs, lookout, counterfactuals
@@ -268,12 +275,14 @@ class _Evaluator:
         """Visits with what is left over that gain once range, time or steps are there."""
         for lack in _RELAXED:
             i, place = int(places.uav[lack]), int(places.place[lack])
-            if i != NONE and places.gain[lack] > 0:
+            if i != NONE and places.gain[lack] > 0 and isinstance(self._lookout, Lookout):
                 step, more_range, late = self._lookout.lacking(i, place, j)
                 yield _Remedy(i, place, relaxation_for(self._problem, None, more_range, int(step), late))
 
     def _reloaded(self, j: int, places: Places) -> Iterator[_Remedy]:
         """Visits of the plan, then additional ones, that bring what is missing with more aboard."""
+        if isinstance(self._lookout, SpareLookout):
+            return
         visits, m = self._plan.visits, self._arrays.shape[0]
         slot = int(visits.first[j])
         while slot != NONE:

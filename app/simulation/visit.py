@@ -37,6 +37,8 @@ COMMITTED_ELSEWHERE = 9
 TOO_LONG_ALOFT = 10
 HOME_TOO_LATE = 11
 RELOADED = 12
+NOT_IN_STOCK = 13
+TOO_HEAVY = 14
 
 RULES = {
     RETURNING: "a returning UAV gets no more targets",
@@ -51,6 +53,8 @@ RULES = {
     TOO_LONG_ALOFT: "the visit, and the way home where it is required, exceed the endurance",
     HOME_TOO_LATE: "it would land after available_until",
     RELOADED: "it has just reloaded",
+    NOT_IN_STOCK: "it would take more than the base has in stock",
+    TOO_HEAVY: "with that load it exceeds its capacity",
 }
 """Rules that an action can break, in words."""
 
@@ -278,12 +282,13 @@ def most_carried(arrays: ProblemArrays, p: int, i: int, k: int) -> float:
 
 @inlined
 def most_ever(arrays: ProblemArrays, p: int, i: int, k: int) -> float:
-    """Most of a material that a UAV may carry: at first, or after a reload at a base that it may use."""
-    most = arrays.load[p, i, k]
+    """Most of a material that a UAV may carry: at first, or after reloads at bases that it may use."""
+    in_stock = 0.0
     for d in range(arrays.stock.shape[1]):
         if arrays.kept_range[p, i, arrays.need.shape[1] + 1 + d] < UNREACHABLE:
-            most = max(most, min(arrays.full[p, i, k], arrays.stock[p, d, k]))
-    return most
+            in_stock += arrays.stock[p, d, k]
+    load = arrays.load[p, i, k]
+    return max(load, min(arrays.full[p, i, k], load + in_stock))
 
 
 @inlined

@@ -1,11 +1,79 @@
-"""The visits of each target as linked lists: one moves to another target; what they connect is found."""
+"""The visits of a plan: by UAV, by target as linked lists, and by flight."""
 
 from __future__ import annotations
 
-from app.simulation.arrays import NONE, Integers
-from app.simulation.decorators import compiled
-from app.simulation.deliveries import Unloading, Visits
-from app.simulation.insertion import CHANGED, MARK
+from typing import NamedTuple
+
+import numpy as np
+
+from app.simulation.arrays import NONE, Integers, ProblemArrays
+from app.simulation.decorators import compiled, inlined
+
+
+class Visits(NamedTuple):
+    """Which UAV stops at which target or base. Stop number s of UAV i is ``slot = s * M + i``.
+
+    Attributes
+    ----------
+    target, length
+        (M, S) targets and bases in order, numbered as actions are, and (M,) stops of each route.
+    first, following
+        (L,) and (S*M,): the stops at each target and base in order, as a linked list of slots.
+    flight
+        (S*M,) the flight that a visit is part of: the slot of the reload before it, or that of the UAV's
+        first stop where there is none.
+    """
+
+    target: Integers
+    length: Integers
+    first: Integers
+    following: Integers
+    flight: Integers
+
+
+def visits_of(arrays: ProblemArrays, actions: Integers) -> Visits:
+    """Turn (S', M) joint actions into visits."""
+    m, n, _ = arrays.shape
+    steps = int(arrays.max_steps[0])
+    visits = Visits(
+        np.zeros((m, steps), np.int64),
+        np.zeros(m, np.int64),
+        np.full(arrays.between.shape[2], NONE, np.int64),
+        np.full(steps * m, NONE, np.int64),
+        np.tile(np.arange(m), steps),
+    )
+    _connect(actions, visits, n)
+    for i in range(m if arrays.n_bases else 0):
+        note_flights(visits, i, n)
+    return visits
+
+
+@compiled
+def note_flights(visits: Visits, i: int, home: int) -> None:
+    """Write down the flights that the visits of UAV `i` are part of; `home` is N."""
+    m = visits.length.shape[0]
+    flight = i
+    for s in range(visits.length[i]):
+        if visits.target[i, s] > home:
+            flight = s * m + i
+        visits.flight[s * m + i] = flight
+
+
+@compiled
+def _connect(actions: Integers, visits: Visits, home: int) -> None:
+    """Write routes and, from the last stop to the first, the lists of targets and bases."""
+    m = actions.shape[1]
+    for s in range(actions.shape[0]):
+        for i in range(m):
+            if actions[s, i] != home:
+                visits.target[i, visits.length[i]] = actions[s, i]
+                visits.length[i] += 1
+    for s in range(actions.shape[0] - 1, -1, -1):
+        for i in range(m - 1, -1, -1):
+            if s < visits.length[i]:
+                j = visits.target[i, s]
+                visits.following[s * m + i] = visits.first[j]
+                visits.first[j] = s * m + i
 
 
 @compiled
@@ -31,60 +99,11 @@ def move_slot(visits: Visits, slot: int, old: int, new: int) -> None:
             visits.following[at] = slot
 
 
-@compiled
-def connected(
-    visits: Visits,
-    routes: Integers,
-    unloading: Unloading,
-    uav_mark: Integers,
-    target_mark: Integers,
-    changed: Integers,
-    tally: Integers,
-    i: int,
-    j: int,
-) -> int:
-    """List the targets that visits connect with the additional one, by their rank, and their UAVs."""
-    served, order, rank = unloading.served, unloading.order, unloading.rank
-    tally[MARK] += 1
-    mark = tally[MARK]
+@inlined
+def first_visit(visits: Visits, f: int, home: int) -> int:
+    """Place in its route of the first visit of a flight; `home` is N."""
     m = visits.length.shape[0]
-    served[0], target_mark[j] = j, mark
-    changed[0], uav_mark[i] = i, mark
-    uavs, found, seen, head = 1, 1, 0, 0
-    while True:
-        # First the routes of all UAVs that are known, then the UAVs of all targets that are known.
-        while seen < uavs:
-            h = changed[seen]
-            for s in range(visits.length[h]):
-                # What the plan has in a visit that is given up is concerned, too; the last one is additional.
-                x = visits.target[h, s] if h != i or s == visits.length[h] - 1 else routes[h, s]
-                if target_mark[x] != mark:
-                    target_mark[x] = mark
-                    served[found] = x
-                    found += 1
-            seen += 1
-        if head == found:
-            break
-        slot = visits.first[served[head]]
-        while slot != NONE:
-            if uav_mark[slot % m] != mark:
-                uav_mark[slot % m] = mark
-                changed[uavs] = slot % m
-                uavs += 1
-            slot = visits.following[slot]
-        head += 1
-    tally[CHANGED] = uavs
-    if found * found > order.shape[0]:
-        q = 0
-        for position in range(order.shape[0]):
-            if target_mark[order[position]] == mark:
-                served[q] = order[position]
-                q += 1
-        return found
-    for q in range(1, found):
-        x, position = served[q], q
-        while position > 0 and rank[served[position - 1]] > rank[x]:
-            served[position] = served[position - 1]
-            position -= 1
-        served[position] = x
-    return found
+    i, s = f % m, f // m
+    begins = s < visits.length[i] and visits.target[i, s] > home
+    first: int = s + 1 if begins else s
+    return first

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.domain.matrices import Matrix
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.domain.surroundings import Base, NoFlyZone, Wind
+from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 from app.simulation.generator import Family, single_base, uniform
 
 _LIGHT = Objective(distance_weight=0.3)
@@ -151,6 +151,22 @@ def stock(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generato
     return replace(problem, uavs=uavs, bases=bases)
 
 
+def loading(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `sorties`, where UAVs begin empty and what each flight carries, by weight, is planned."""
+    problem = sorties(n_uavs, n_targets, n_materials, rng)
+    weights = rng.choice([0.25, 0.5, 1.0, 2.0], n_materials)
+    materials = tuple(Material(f"material-{k + 1}", float(weight)) for k, weight in enumerate(weights))
+    empty = (0.0,) * n_materials
+    uavs = tuple(
+        replace(u, loadlist=empty, full_load=empty, capacity=float(rng.uniform(2, 5))) for u in problem.uavs
+    )
+    needed = np.array([t.loadlist for t in problem.targets]).sum(axis=0)
+    stock = np.round(needed * rng.uniform(0.5, 1.0, n_materials)) if rng.random() < 0.5 else None
+    bases = (replace(problem.bases[0], stock=None if stock is None else tuple(stock.tolist())),)
+    objective = replace(_LIGHT, unloading="planned", loading="planned")
+    return replace(problem, uavs=uavs, bases=bases, materials=materials, objective=objective)
+
+
 def _whole_needs(problem: Problem, rng: np.random.Generator) -> Problem:
     """Let every UAV carry enough for all that it can visit, so that areas are visited once or not at all."""
     most = sum(sorted((sum(t.loadlist) for t in problem.targets), reverse=True)[: problem.max_steps])
@@ -173,6 +189,7 @@ def _zone(problem: Problem, number: int, rng: np.random.Generator) -> NoFlyZone:
 
 
 WORLD_FAMILIES: Mapping[str, Family] = {
-    each.__name__: each for each in (windows, zones, windy, promised, fair, partly, matrix, sorties, stock)
+    each.__name__: each
+    for each in (windows, zones, windy, promised, fair, partly, matrix, sorties, stock, loading)
 }
 """The families by name."""

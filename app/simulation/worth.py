@@ -96,3 +96,10 @@ def worth_by_material(arrays: ProblemArrays) -> Floats:
     need = arrays.need[0]
     first = np.where(need > arrays.beyond[0], 1.0 + arrays.terms["bonus"][0], 1.0)
     return arrays.areas["unit"][0][:, None] * need * first
+
+
+def satisfaction_of(arrays: ProblemArrays, met: Floats) -> float:
+    """Return what amounts (N, K) of the needs earn, whenever they are delivered, where nothing decays."""
+    first = np.maximum(0.0, arrays.need[0] - arrays.beyond[0])
+    counted = met + float(arrays.terms["bonus"][0]) * np.minimum(met, first)
+    return float((arrays.areas["unit"][0][:, None] * counted).sum())

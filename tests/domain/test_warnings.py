@@ -95,6 +95,11 @@ TROUBLES = {
         "/targets/0/loadlist/1",
         "material 2 is needed by 6 targets",
     ),
+    "no_capacity": (
+        replace(scene(unloading="planned", loading="planned"), bases=(Base("base-1", 34.84, -19.83),)),
+        "/uavs/0",
+        "whatever is in stock",
+    ),
     "not_needed": (
         with_targets(scene(), lambda t: {"loadlist": (2.0, 0.0)}),
         "/uavs/0/loadlist/1",
@@ -105,11 +110,6 @@ TROUBLES = {
         with_targets(scene(), lambda t: {"x": 34.84, "y": -19.83}),
         "/targets/0/x",
         "one and the same",
-    ),
-    "planned_with_bases": (
-        replace(scene(unloading="planned"), bases=(Base("base-1", 34.84, -19.83),)),
-        "/objective/unloading",
-        "as greedy unloading does",
     ),
     "range_implausible": (
         with_uavs(scene(), lambda u: {"voyage": 160_000.0}, 1),

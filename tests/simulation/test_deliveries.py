@@ -13,10 +13,10 @@ from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.deliveries import best_deliveries
 from app.simulation.evaluation import reward_of
 from app.simulation.explain import explain
 from app.simulation.generator import generate
+from app.simulation.planned_amounts import best_amounts
 
 
 def worth(problem, delivered, actions):
@@ -83,7 +83,7 @@ def test_the_amounts_are_the_best_for_the_routes():
     for _ in range(250):
         problem = scarce(rng)
         actions = random_routes(rng, problem)
-        delivered = best_deliveries(compile_problem(problem), actions)
+        delivered = best_amounts(compile_problem(problem), actions).delivered
         assert delivered.min() >= 0
         for i, uav in enumerate(problem.uavs):
             assert np.all(delivered[:, i].sum(axis=0) <= np.array(uav.loadlist) * (1 + 1e-9))
@@ -96,7 +96,7 @@ def test_the_amounts_are_the_best_for_the_routes():
 def test_a_chain_of_uavs_takes_over_from_each_other():
     # Only u1 gets to "last"; it can go on if u2 takes over at "first", and u3 at "second".
     arrays = compile_problem(chain())
-    delivered = best_deliveries(arrays, np.array([[0, 0, 1], [2, 1, 3]]))
+    delivered = best_amounts(arrays, np.array([[0, 0, 1], [2, 1, 3]])).delivered
     assert delivered[:, :, 0].tolist() == [[0.0, 1.0, 1.0], [1.0, 0.0, 0.0]]
 
 
@@ -152,7 +152,7 @@ def test_the_referee_agrees_on_every_option():
         problem = random_problem(rng)
         problem = replace(problem, objective=replace(problem.objective, unloading="planned"))
         plan = Plan.of(random_routes(rng, problem), problem.n_targets)
-        delivered = best_deliveries(compile_problem(problem), plan.as_array()).tolist()
+        delivered = best_amounts(compile_problem(problem), plan.as_array()).delivered.tolist()
         try:
             expected = replay(problem_to_record(problem), plan.assignment, delivered)
         except Illegal:

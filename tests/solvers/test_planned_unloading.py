@@ -13,10 +13,10 @@ from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.deliveries import best_deliveries
 from app.simulation.evaluation import reward_of
 from app.simulation.explain import explain
 from app.simulation.generator import generate
+from app.simulation.planned_amounts import best_amounts
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import Deadline, never
@@ -95,7 +95,7 @@ def best_of_all(problem):
         actions = np.full((max(1, *map(len, fleet)), problem.n_uavs), problem.n_targets, np.int64)
         for i, route in enumerate(fleet):
             actions[: len(route), i] = route
-        delivered = best_deliveries(arrays, actions).tolist()
+        delivered = best_amounts(arrays, actions).delivered.tolist()
         try:
             best = max(best, replay(record, actions.tolist(), delivered)["reward"])
         except Illegal:

@@ -153,8 +153,8 @@ class Replay:
         home = self.way_home(craft, craft.at)
         return craft.clock + (home.time if home else 0.0)
 
-    def reload(self, s, i, d):
-        """Let UAV `i` land at base `d` in step `s`, and take up what it lacks; raises Illegal."""
+    def reload(self, s, i, d, given=None):
+        """Let UAV `i` land at base `d` in step `s`, and take what it lacks, or is given; raises Illegal."""
         craft, base, stock = self.fleet[i], self.bases[d], self.stocks[d]
         if not craft.out:
             raise Illegal(s, i, "returning")
@@ -179,8 +179,10 @@ class Replay:
             max(0.0, min(full - have, there))
             for full, have, there in zip(craft.full, craft.hold, stock, strict=True)
         ]
-        craft.hold = [have + more for have, more in zip(craft.hold, loaded, strict=True)]
-        self.stocks[d] = [there - gone for there, gone in zip(stock, loaded, strict=True)]
+        if given is not None:
+            loaded = self.loaded_as_given(s, i, d, given)
+        craft.hold = [max(0.0, have + more) for have, more in zip(craft.hold, loaded, strict=True)]
+        self.stocks[d] = [max(0.0, there - gone) for there, gone in zip(stock, loaded, strict=True)]
         craft.stops.append(
             {
                 "step": s + 1,
@@ -192,12 +194,27 @@ class Replay:
             }
         )
 
+    def loaded_as_given(self, s, i, d, given):
+        """What a reload takes, or leaves behind, if stock, load and capacity allow it; raises Illegal."""
+        craft, materials = self.fleet[i], self.problem.get("materials")
+        weights = [each.get("weight", 1.0) for each in materials] if materials else [1.0] * len(given)
+        for amount, have, there in zip(given, craft.hold, self.stocks[d], strict=True):
+            if amount > there + TOLERANCE * max(1.0, there):
+                raise Illegal(s, i, "stock")
+            if have + amount < -TOLERANCE * max(1.0, have):
+                raise Illegal(s, i, "amount")
+        weight = sum(w * (have + more) for w, have, more in zip(weights, craft.hold, given, strict=True))
+        if craft.record.get("capacity") is not None and weight > craft.record["capacity"] * (1 + TOLERANCE):
+            raise Illegal(s, i, "capacity")
+        return list(given)
+
     def visit(self, s, i, j, given):
         """Fly UAV `i` to area `j` in step `s`; raises Illegal."""
         craft, area, wanted = self.fleet[i], self.areas[j], self.needs[j]
         if not craft.out:
             raise Illegal(s, i, "returning")
-        unloaded = unloaded_by(craft, wanted, area, self.problem["uavs"][i]["loadlist"], given)
+        carried = list(map(max, craft.loaded, craft.full, craft.hold))
+        unloaded = unloaded_by(craft, wanted, area, carried, given)
         if unloaded is None:
             raise Illegal(s, i, "amount")
         if not any(amount > 0 for amount in unloaded):
@@ -257,10 +274,11 @@ class Replay:
             wanted[k] = without(wanted[k], amount, asked[k])
 
 
-def replay(problem, assignment, delivered=None, legs=None):
+def replay(problem, assignment, delivered=None, legs=None, loaded=None):
     """Reward, satisfaction, distance and remaining needs of a legal plan; raises Illegal otherwise.
 
-    With planned unloading `delivered` says what every visit unloads: amounts by step, UAV and material.
+    With planned unloading `delivered` says what every visit unloads: amounts by step, UAV and material. With
+    planned loading `loaded` says so of every reload.
     `legs` are those of the problem, where they are known already.
     """
     flight, n = Replay(problem, legs), len(problem["targets"])
@@ -274,7 +292,7 @@ def replay(problem, assignment, delivered=None, legs=None):
             if choice == n:
                 flight.land(craft)
             elif choice > n:
-                flight.reload(s, i, choice - n - 1)
+                flight.reload(s, i, choice - n - 1, None if loaded is None else loaded[s][i])
             else:
                 flight.visit(s, i, choice, None if delivered is None else delivered[s][i])
                 visited.add((i, choice))

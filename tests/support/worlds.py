@@ -9,7 +9,7 @@ from problems import random_problem
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
 from app.domain.problem import Problem
-from app.domain.surroundings import Base, NoFlyZone, Wind
+from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 
 
 def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
@@ -65,6 +65,31 @@ def random_sorties(rng: np.random.Generator, max_uavs: int = 4, max_targets: int
         for uav in problem.uavs
     )
     return replace(problem, uavs=uavs, bases=tuple(bases))
+
+
+def random_loading(rng: np.random.Generator, max_uavs: int = 3, max_targets: int = 5) -> Problem:
+    """The same with amounts that are planned: what visits unload and, mostly, what reloads take."""
+    problem = random_sorties(rng, max_uavs, max_targets)
+    weights = [float(rng.choice([0.25, 0.5, 1.0, 2.0, 0.0])) for _ in range(problem.n_materials)]
+    materials = tuple(Material(f"material-{k + 1}", weight) for k, weight in enumerate(weights))
+    uavs = []
+    for uav in problem.uavs:
+        loads = map(max, uav.loadlist, uav.full)
+        least = sum(weight * amount for weight, amount in zip(weights, loads, strict=True))
+        capacity = max(least, float(rng.uniform(1, 10)))
+        uavs.append(replace(uav, capacity=capacity if rng.random() < 0.9 else None))
+    objective = replace(
+        problem.objective,
+        half_life=None,
+        unloading="planned",
+        loading="planned" if rng.random() < 0.8 else "refill",
+    )
+    bases = problem.bases
+    if rng.random() < 0.4:
+        bases = tuple(replace(base, stock=None) for base in bases)
+    if rng.random() < 0.5:
+        uavs = [replace(uav, loadlist=(0.0,) * problem.n_materials) for uav in uavs]
+    return replace(problem, uavs=tuple(uavs), materials=materials, bases=bases, objective=objective)
 
 
 def _timed(problem: Problem, rng: np.random.Generator, across: float) -> Problem:

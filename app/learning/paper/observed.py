@@ -42,6 +42,7 @@ _TAKEN = frozenset(
         # Nothing without `bases`.
         "uavs.full_load",
         "uavs.bases",
+        "objective.loading",
     }
 )
 

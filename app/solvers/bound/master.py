@@ -8,8 +8,8 @@ import highspy
 import numpy as np
 
 from app.simulation.arrays import Flags, Floats
+from app.simulation.highs import QuietHighs
 from app.solvers.bound.instance import Instance
-from app.solvers.highs import QuietHighs
 from app.solvers.protocol import StopCriterion
 
 IDLE = -1

@@ -22,8 +22,8 @@ import highspy
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.highs import QuietHighs
 from app.solvers.column_generation.pool import Pool
-from app.solvers.highs import QuietHighs
 from app.solvers.protocol import StopCriterion
 from app.solvers.scale import largest_level
 from app.solvers.stop import never

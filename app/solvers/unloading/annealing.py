@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from app.domain.plan import Actions
-from app.simulation.arrays import NONE, Floats, ProblemArrays
+from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled, compiled_nogil
-from app.simulation.deliveries import Unloading, Visits, new_unloading, serve
+from app.simulation.deliveries import Unloading, any_limited, new_unloading
+from app.simulation.loads import serve_at_best
+from app.simulation.visit_lists import Visits, first_visit, note_flights
 from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
 from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, feasible, undo
 from app.solvers.local_search.moves import draw_move
@@ -34,6 +36,10 @@ class PlannedSearch(NamedTuple):
         What it keeps of greedy unloading is not read.
     unloading
         What the visits earn when they unload at best.
+    flight
+        (S*M,) the flights that the visits of the current routes are part of.
+    limited
+        Whether stocks are limited, so that a change concerns all targets.
     before
         (N,) what was earned at the targets that a change concerns, in the order in which they are served.
     tally
@@ -42,6 +48,8 @@ class PlannedSearch(NamedTuple):
 
     search: Search
     unloading: Unloading
+    flight: Integers
+    limited: bool
     before: Floats
     tally: Floats
 
@@ -58,19 +66,25 @@ def new_planned_search(arrays: ProblemArrays, actions: Actions) -> PlannedSearch
     """
     search, unloading = new_search(arrays), new_unloading(arrays)
     set_routes(search, actions)
-    routes = search.routes
+    m, n, _ = arrays.shape
+    planned = PlannedSearch(
+        search, unloading, np.tile(np.arange(m), int(arrays.max_steps[0])), bool(any_limited(arrays)),
+        np.zeros(n), np.zeros(3),
+    )  # fmt: skip
+    visits = visits_of_routes(search.routes, planned.flight)
+    for i in range(m if arrays.n_bases else 0):
+        note_flights(visits, i, n)
     unloading.served[:] = unloading.order
-    earned = serve(arrays, visits_of_routes(routes), unloading, len(unloading.served))
-    planned = PlannedSearch(search, unloading, np.zeros(arrays.shape[1]), np.array([0.0, 0.0, earned]))
+    planned.tally[SATISFACTION] = serve_at_best(arrays, visits, unloading, n)
     search.best[0] = -np.inf
     keep_if_best(planned)
     return planned
 
 
 @compiled
-def visits_of_routes(routes: Routes) -> Visits:
+def visits_of_routes(routes: Routes, flight: Integers) -> Visits:
     """Look at the routes of a search as visits."""
-    return Visits(routes.target, routes.length, routes.first, routes.following)
+    return Visits(routes.target, routes.length, routes.first, routes.following, flight)
 
 
 @compiled
@@ -129,12 +143,13 @@ def anneal_planned(
         if search.most - tally[SATISFACTION] - price < least:
             continue
         apply(arrays, routes, change, extra, closing)
+        _note_flights(planned, routes, change)
         concerned = _concerned(planned, routes, change)
         before = 0.0
         for q in range(concerned):
             planned.before[q] = planned.unloading.value[planned.unloading.served[q]]
             before += planned.before[q]
-        earned = serve(arrays, visits_of_routes(routes), planned.unloading, concerned)
+        earned = serve_at_best(arrays, visits_of_routes(routes, planned.flight), planned.unloading, concerned)
         gain = earned - before - price
         tally[WORK] += planned.unloading.number[2]
         planned.unloading.number[2] = 0
@@ -144,6 +159,7 @@ def anneal_planned(
                 keep_if_best(planned)
         else:
             undo(search.arrays, routes, change)
+            _note_flights(planned, routes, change)
             for q in range(concerned):
                 planned.unloading.value[planned.unloading.served[q]] = planned.before[q]
     tally[MOVES] += tried
@@ -151,29 +167,52 @@ def anneal_planned(
 
 
 @compiled
+def _note_flights(planned: PlannedSearch, routes: Routes, change: Change) -> None:
+    """Write down the flights of the routes that a change concerns, as they are now."""
+    arrays = planned.search.arrays
+    if arrays.stock.shape[1] > 0:
+        for side in range(2):
+            if change.uav[side] != NONE:
+                note_flights(visits_of_routes(routes, planned.flight), change.uav[side], arrays.need.shape[1])
+
+
+@compiled
 def _concerned(planned: PlannedSearch, routes: Routes, change: Change) -> int:
     """List the targets whose deliveries an applied change may alter, in the order of their rank."""
-    unloading, m = planned.unloading, routes.length.shape[0]
+    unloading, m, home = planned.unloading, routes.length.shape[0], planned.search.arrays.need.shape[1]
+    if planned.limited:
+        for place in range(home):
+            unloading.served[place] = unloading.order[place]
+        planned.tally[WORK] += home
+        return home
     unloading.number[0] += 1
     mark, found = unloading.number[0], 0
     for side in range(2):
         i = change.uav[side]
-        if i != NONE:
-            found = _visited_by(planned, routes, i, mark, found)
-            for s in range(change.begin[side], change.length[side]):
-                j = change.target[side, s]
-                if unloading.seen_target[j] != mark:
-                    unloading.seen_target[j] = mark
-                    unloading.served[found] = j
-                    found += 1
+        if i == NONE:
+            continue
+        now, before = routes.length[i], change.length[side]
+        # What both routes end with has moved, and is part of the same flights, but for the first of it.
+        same = 0
+        if planned.search.arrays.stock.shape[1] > 0:
+            least = min(now, before) - change.begin[side]
+            while same < least and routes.target[i, now - 1 - same] == change.target[side, before - 1 - same]:
+                same += 1
+        for s in range(max(0, min(change.begin[side], now) - 1), min(now - same + 1, now)):
+            f = planned.flight[s * m + i]
+            if unloading.seen_flight[f] != mark:
+                found = _visited_by(planned, routes, f, mark, found)
+        for s in range(change.begin[side], before - same):
+            found = _concerns(unloading, change.target[side, s], home, mark, found)
     planned.tally[WORK] += found
     head = 0
     while head < found:
         slot = routes.first[unloading.served[head]]
         while slot != NONE:
             planned.tally[WORK] += 1.0
-            if unloading.seen_uav[slot % m] != mark:
-                found = _visited_by(planned, routes, slot % m, mark, found)
+            f = planned.flight[slot]
+            if unloading.seen_flight[f] != mark:
+                found = _visited_by(planned, routes, f, mark, found)
             slot = routes.following[slot]
         head += 1
     if found * found > unloading.order.shape[0]:
@@ -193,14 +232,22 @@ def _concerned(planned: PlannedSearch, routes: Routes, change: Change) -> int:
 
 
 @compiled
-def _visited_by(planned: PlannedSearch, routes: Routes, i: int, mark: int, found: int) -> int:
-    """Append the targets of UAV `i` that are not in the list yet; return its new length."""
-    unloading = planned.unloading
-    unloading.seen_uav[i] = mark
-    for s in range(routes.length[i]):
-        j = routes.target[i, s]
-        if unloading.seen_target[j] != mark:
-            unloading.seen_target[j] = mark
-            unloading.served[found] = j
-            found += 1
+def _visited_by(planned: PlannedSearch, routes: Routes, f: int, mark: int, found: int) -> int:
+    """Append the targets of a flight that are not in the list yet; return its new length."""
+    unloading, m, home = planned.unloading, routes.length.shape[0], planned.search.arrays.need.shape[1]
+    unloading.seen_flight[f] = mark
+    i, s = f % m, first_visit(visits_of_routes(routes, planned.flight), f, home)
+    while s < routes.length[i] and routes.target[i, s] < home:
+        found = _concerns(unloading, routes.target[i, s], home, mark, found)
+        s += 1
+    return found
+
+
+@compiled
+def _concerns(unloading: Unloading, j: int, home: int, mark: int, found: int) -> int:
+    """Append a target if it is not in the list yet; return the list's new length."""
+    if j < home and unloading.seen_target[j] != mark:
+        unloading.seen_target[j] = mark
+        unloading.served[found] = j
+        found += 1
     return found

@@ -10,19 +10,27 @@ import numpy as np
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
 from app.simulation.arrays import ProblemArrays, compile_problem
-from app.simulation.deliveries import best_deliveries
-from app.simulation.replay import replay_delivering
+from app.simulation.evaluation import replay_at_best
+from app.simulation.planned_amounts import amounts_are_exact, best_amounts
 from app.simulation.visit import ALLOWED
+from app.solvers.bound.enumeration import is_tiny
 from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of
-from app.solvers.protocol import History, Progress, Report, Solution, Solver, StopCriterion
+from app.solvers.protocol import History, Progress, Proof, Report, Solution, Solver, StopCriterion
 from app.solvers.scale import largest_level
 from app.solvers.seeds import seed_sequence
 from app.solvers.stop import share_of_time
+from app.solvers.unloading.all_routes import AllRoutes
 from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
 
 _ALGORITHM_SHARE = 0.6
 """Share of the work, and of a time limit, that the algorithm itself has."""
+
+_ALGORITHM_SHARE_LOADING = 0.3
+"""The same where loading is planned: the algorithm knows but one mix of materials."""
+
+_ALGORITHM_SHARE_TINY = 0.2
+"""The same for a tiny problem with bases, whose plans are then all looked at."""
 
 _MOVES_A_VISIT = 8_000
 """Moves for each visit there can be."""
@@ -47,7 +55,8 @@ class PlannedUnloading:
     Where unloading is greedy it only passes the problem on. Where it is planned, the algorithm solves the
     problem under greedy unloading, so that what it learns stays what the library holds; every plan it reports
     is unloaded at best; and from the best of these a search with planned unloading goes on. No plan is worse
-    under planned than under greedy unloading, so neither is the answer.
+    under planned than under greedy unloading, so neither is the answer. Where loading is planned too, the
+    algorithm refills UAVs with a mix of materials as the areas need them.
 
     Parameters
     ----------
@@ -66,22 +75,38 @@ class PlannedUnloading:
         """
         if not problem.plans_unloading or nothing_to_fly(problem):
             return self.algorithm.solve(problem, seed, stop, report)
-        greedy = replace(problem, objective=replace(problem.objective, unloading="greedy"))
+        greedy = greedily(problem)
         incumbent = _Incumbent(problem)
         if problem.start_plan:
             incumbent.consider(Plan(problem.start_plan))
 
+        tiny = bool(problem.bases) and is_tiny(incumbent.arrays) and amounts_are_exact(incumbent.arrays)
+        share = (
+            _ALGORITHM_SHARE_TINY
+            if tiny
+            else _ALGORITHM_SHARE_LOADING
+            if problem.plans_loading
+            else _ALGORITHM_SHARE
+        )
+
         def told(progress: Progress) -> None:
             incumbent.consider(progress.incumbent)
-            fraction = _ALGORITHM_SHARE * progress.fraction
-            report(Progress(fraction, progress.epoch, incumbent.reward, incumbent.plan))
+            report(Progress(share * progress.fraction, progress.epoch, incumbent.reward, incumbent.plan))
 
-        solution = self.algorithm.solve(greedy, seed, share_of_time(stop, _ALGORITHM_SHARE), told)
+        solution = self.algorithm.solve(greedy, seed, share_of_time(stop, share), told)
         incumbent.consider(solution.plan)
         history = History(list(solution.history.epoch), list(solution.history.reward))
         rng = np.random.default_rng(seed_sequence(seed, 0, 1))
-        _improve(incumbent, rng, stop, report, history)
-        return replace(solution, plan=incumbent.plan, history=history)
+        until = share_of_time(stop, 0.5) if tiny else stop
+        _improve(incumbent, rng, until, report, history, share)
+        proof = None
+        if tiny and not stop():
+            plans = AllRoutes(incumbent.arrays, incumbent.plan.as_array(), incumbent.reward)
+            plans.run(stop)
+            incumbent.consider_actions(plans.actions)
+            history.add(history.epoch[-1] + 1, incumbent.reward)
+            proof = Proof(incumbent.reward, True) if plans.complete else None
+        return replace(solution, plan=incumbent.plan, history=history, proof=proof)
 
 
 class _Incumbent:
@@ -109,31 +134,65 @@ class _Incumbent:
             self.plan, self.reward = Plan.of(actions, self.problem.n_targets), reward
 
 
-def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
-    """Take the visits out of a plan that unload nothing when everything is unloaded at best.
+def greedily(problem: Problem) -> Problem:
+    """Return the problem with greedy unloading; what was to be loaded as planned is refilled.
 
-    The way without a visit is not longer and not later, and the deliveries stay possible.
+    Every flight then begins with the mix of materials that the areas need by weight, as far as any base has
+    them.
+    """
+    objective = replace(problem.objective, unloading="greedy", loading="refill")
+    if not problem.plans_loading:
+        return replace(problem, objective=objective)
+    weights = np.array(problem.weights)
+    in_stock = [
+        any(base.stock is None or base.stock[k] > 0.0 for base in problem.bases)
+        for k in range(problem.n_materials)
+    ]
+    needed = np.array([target.need for target in problem.targets]).sum(axis=0) * in_stock
+    heavy = float(weights @ needed)
+    uavs = []
+    for uav in problem.uavs:
+        share = 1.0
+        if uav.capacity is not None and heavy > uav.capacity:
+            share = uav.capacity / heavy
+        full = np.where(weights > 0.0, share * needed, needed)
+        uavs.append(replace(uav, full_load=tuple(full.tolist()), capacity=None))
+    return replace(problem, objective=objective, uavs=tuple(uavs))
+
+
+def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
+    """Take the stops out of a plan that are of no use when everything is unloaded at best.
+
+    These are visits that unload nothing, and reloads without a visit before the next one. Mostly the way
+    without a stop is not longer and not later; the deliveries stay possible.
     """
     home = arrays.shape[1]
     while True:
-        useless = (actions < home) & ~(best_deliveries(arrays, actions) > 0).any(axis=2)
-        if not useless.any():
-            return actions
+        useless = (actions < home) & ~(best_amounts(arrays, actions).delivered > 0).any(axis=2)
         shorter = np.full_like(actions, home)
         for i in range(actions.shape[1]):
-            route = actions[(actions[:, i] < home) & ~useless[:, i], i]
+            route = actions[(actions[:, i] != home) & ~useless[:, i], i]
+            idle = (route > home) & np.append(route[1:] > home, True)
+            route = route[~idle]
             shorter[: len(route), i] = route
+        if np.array_equal(shorter, actions):
+            return actions
         actions = shorter
 
 
 def _reward(arrays: ProblemArrays, actions: Actions) -> float:
     """Reward of a plan; minus infinity for one that is not legal."""
-    result = replay_delivering(arrays, actions, best_deliveries(arrays, actions))
+    result, _ = replay_at_best(arrays, actions, True)
     return float(result.reward[0]) if result.rule[0] == ALLOWED else -np.inf
 
 
 def _improve(
-    incumbent: _Incumbent, rng: np.random.Generator, stop: StopCriterion, report: Report, history: History
+    incumbent: _Incumbent,
+    rng: np.random.Generator,
+    stop: StopCriterion,
+    report: Report,
+    history: History,
+    begin: float,
 ) -> None:
     """Search on from the incumbent; without time, not even what the search needs is made ready."""
     if stop():
@@ -158,7 +217,7 @@ def _improve(
             known = float(planned.search.best[0])
             incumbent.consider_actions(actions_of(planned.search))
         history.add(epoch + number, incumbent.reward)
-        fraction = _ALGORITHM_SHARE + (1 - _ALGORITHM_SHARE) * number / _ROUNDS
+        fraction = begin + (1 - begin) * number / _ROUNDS
         report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
 
 

@@ -1,4 +1,4 @@
-"""HiGHS as the solvers use it: quiet, on one thread, whatever else uses it in the same process."""
+"""HiGHS as it is used here: quiet, on one thread, whatever else uses it in the same process."""
 
 from __future__ import annotations
 

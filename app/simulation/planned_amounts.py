@@ -1,0 +1,87 @@
+"""What a plan unloads, and loads, where that is planned: the best amounts of its routes.
+
+They follow from problem and routes, so a plan is its joint actions alone, here as everywhere. Where they are
+one transportation problem, they are found by flows (:mod:`app.simulation.deliveries` and
+:mod:`app.simulation.loads`), otherwise by a linear program (:mod:`app.simulation.amounts_program`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from app.domain.problem import ROUNDING
+from app.simulation.amounts import Amounts
+from app.simulation.amounts_program import amounts_by_program, in_turn
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.deliveries import new_unloading
+from app.simulation.loads import serve_at_best
+from app.simulation.visit_lists import visits_of
+
+_LARGEST_PROGRAM = 20_000
+"""Amounts, of stops and materials, up to which a linear program is solved: some seconds at most."""
+
+
+def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
+    """Work out what the stops of a plan unload and load at best.
+
+    Where loads are refilled, ``loaded`` is 0: the simulator knows what a reload takes. Where stocks are
+    limited then, or a program would be too large, the amounts are possible, and not always the best.
+
+    Parameters
+    ----------
+    arrays
+        A stack of one problem.
+    actions
+        (S', M) joint actions; ranges and deadlines do not matter here.
+
+    Returns
+    -------
+    Amounts
+        0 where there is no stop, and where one is of no use.
+    """
+    by_flow = Amounts(_by_flow(arrays, actions), np.zeros((*actions.shape, arrays.shape[2])))
+    if not arrays.terms["plans_loading"][0]:
+        return by_flow
+    too_large = int((actions != arrays.shape[1]).sum()) * arrays.shape[2] > _LARGEST_PROGRAM
+    if too_large or _is_flow(arrays):
+        return in_turn(arrays, actions, by_flow)
+    key = actions.shape, actions.tobytes()
+    for need, known, amounts in tuple(_solved):
+        if need is arrays.need and known == key:
+            return amounts
+    amounts = amounts_by_program(arrays, actions)
+    _solved.append((arrays.need, key, amounts))
+    return amounts
+
+
+_solved: deque[tuple[Floats, tuple[tuple[int, ...], bytes], Amounts]] = deque(maxlen=4)
+"""The newest programs, by problem and plan: search, answer and explanation ask for the same one."""
+
+
+def amounts_are_exact(arrays: ProblemArrays) -> bool:
+    """Whether :func:`best_amounts` finds the best amounts of any plan that is not too large for a program."""
+    if arrays.terms["plans_loading"][0] or not arrays.n_bases:
+        return True
+    unlimited = bool(np.isinf(arrays.stock[0]).all())
+    return unlimited and bool((arrays.load[0] <= arrays.full[0]).all())
+
+
+def _is_flow(arrays: ProblemArrays) -> bool:
+    """Whether nothing limits the amounts but capacities and needs, so that those of the flow are the best."""
+    return not arrays.load.any() and bool(np.isinf(arrays.stock[0]).all())
+
+
+def _by_flow(arrays: ProblemArrays, actions: Integers) -> Floats:
+    m, n, k = arrays.shape
+    visits, unloading = visits_of(arrays, actions), new_unloading(arrays)
+    unloading.served[:] = unloading.order
+    serve_at_best(arrays, visits, unloading, n)
+    delivered = np.zeros((*actions.shape, k))
+    most = np.maximum(arrays.load[0], arrays.full[0])
+    for s, i in np.argwhere(actions < n):
+        possible = np.minimum(most[i], arrays.need[0, actions[s, i]])
+        amount = unloading.amount[s * m + i]
+        delivered[s, i] = np.where(amount > ROUNDING * possible, np.minimum(amount, possible), 0.0)
+    return delivered
