@@ -96,7 +96,10 @@ TROUBLES = {
         "material 2 is needed by 6 targets",
     ),
     "no_capacity": (
-        replace(scene(unloading="planned", loading="planned"), bases=(Base("base-1", 34.84, -19.83),)),
+        with_uavs(
+            replace(scene(unloading="planned", loading="planned"), bases=(Base("base-1", 34.84, -19.83),)),
+            lambda u: {"capacity": 500.0 if u.id != "uav-1" else None},
+        ),
         "/uavs/0",
         "whatever is in stock",
     ),

@@ -233,6 +233,7 @@ USED = {
         (Objective, name): 2.0 for name in ("half_life", "minimum_weight", "makespan_weight", "change_weight")
     },
     (Objective, "minimum_share"): 0.5,
+    (Objective, "loading"): "planned",
     (Problem, "no_fly_zones"): (NoFlyZone("z", ((0, 1), (1, 1), (1, 2))),),
     (Problem, "wind"): Wind(0.5, 90.0),
     (Problem, "bases"): (Base("b", 1, 1),),
@@ -263,7 +264,8 @@ def with_field(of, name, value):
     if of is Target:
         return replace(problem, targets=(replace(problem.targets[0], **{name: value}),))
     if of is Objective:
-        return replace(problem, objective=replace(problem.objective, **{name: value}))
+        beside = {"unloading": "planned"} if name == "loading" else {}
+        return replace(problem, objective=replace(problem.objective, **beside, **{name: value}))
     return replace(problem, **{name: value})
 
 

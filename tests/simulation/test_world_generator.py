@@ -6,7 +6,11 @@ import pytest
 from app.domain.world_use import uses_world
 from app.simulation.evaluation import reward_of
 from app.simulation.world_generator import WORLD_FAMILIES
-from app.solvers.greedy import greedy_plan
+from app.solvers.protocol import SolverContext
+from app.solvers.registry import create_solver, parse_parameters
+from app.solvers.stop import never
+
+SOLVER = create_solver("greedy", parse_parameters("greedy", {}), SolverContext())
 
 HAS = {
     "windows": lambda p: any(t.earliest for t in p.targets) and all(u.endurance for u in p.uavs),
@@ -17,6 +21,7 @@ HAS = {
     "matrix": lambda p: {u.profile for u in p.uavs} == set(p.matrices),
     "sorties": lambda p: len(p.bases) == 1 and p.bases[0].stock is None,
     "stock": lambda p: all(b.stock for b in p.bases) and any(not any(u.loadlist) for u in p.uavs),
+    "loading": lambda p: p.plans_loading and not any(any(u.loadlist) for u in p.uavs),
     "fair": lambda p: p.objective.half_life and p.objective.minimum_share,
 }
 
@@ -27,6 +32,6 @@ def test_problems_have_what_their_family_is_for(family):
         problem = WORLD_FAMILIES[family](8, 16, 2, np.random.default_rng(number))
         assert uses_world(problem)
         assert HAS[family](problem)
-        assert reward_of(problem, greedy_plan(problem)) > 0
+        assert reward_of(problem, SOLVER.solve(problem, 1, never, lambda _told: None).plan) > 0
     again = WORLD_FAMILIES[family](8, 16, 2, np.random.default_rng(number))
     assert again == problem

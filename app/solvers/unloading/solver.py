@@ -38,6 +38,9 @@ _MOVES_A_VISIT = 8_000
 _MOST_WORK = 60e6
 """Visits that a search looks at, at most: about a second."""
 
+_LONGEST = 25
+"""Times as many of both, at most, for which a search with reloads goes on under a time limit."""
+
 _PIECE_WORK = 100e3
 """Visits looked at between two looks at the stop criterion: about 2 ms."""
 
@@ -203,14 +206,18 @@ def _improve(
     possible = len(near.active) > 0 and len(near.wanted) > 0
     visits = arrays.shape[0] * int(arrays.max_steps[0])
     moves, limit, heat = _MOVES_A_VISIT * visits, stop.seconds_left(), 0.0
+    # With reloads this search finds most of what there is to find, and uses the time that it has.
+    most = _LONGEST if arrays.n_bases and limit < math.inf else 1
     known = float(planned.search.best[0])
     for number in range(1, _ROUNDS + 1):
         while possible and not stop():
-            share = _share_done(planned, moves, limit, stop) * _ROUNDS - (number - 1)
+            share = _share_done(planned, most * moves, most * _MOST_WORK, limit, stop) * _ROUNDS - (
+                number - 1
+            )
             if share >= 1.0:
                 break
             _piece(planned, rng, moves, heat, max(share, 0.0))
-            done = _share_done(planned, moves, limit, stop)
+            done = _share_done(planned, most * moves, most * _MOST_WORK, limit, stop)
             heat = min(1.0, planned.tally[MOVES] / max(done, 1e-9) / (_PATIENT_MOVES_A_VISIT * visits))
         # To unload a large plan at best takes a while, also when time is up.
         if planned.search.best[0] > known:
@@ -221,10 +228,10 @@ def _improve(
         report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
 
 
-def _share_done(planned: PlannedSearch, moves: int, limit: float, stop: StopCriterion) -> float:
+def _share_done(planned: PlannedSearch, moves: int, work: float, limit: float, stop: StopCriterion) -> float:
     """How much of the search is done: by moves, by work, or by the time limit, whichever is most."""
     by_time = 1.0 - stop.seconds_left() / limit if 0.0 < limit < math.inf else 0.0
-    return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / _MOST_WORK, by_time))
+    return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / work, by_time))
 
 
 def _piece(planned: PlannedSearch, rng: np.random.Generator, moves: int, heat: float, share: float) -> None:
