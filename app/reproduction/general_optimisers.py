@@ -20,8 +20,10 @@ They cannot express
 - in PyVRP, where distance is charged but not the leg home, a cost of distance: the cost is that of time at
   the UAV's speed, so service times are charged too, and given back through the prizes at the mean speed, and
   so is waiting;
-- endurance, ``available_until``, commitments, wind's air lengths, what decays, first shares, makespan and
-  changes: plans are flown by our rules, and visits that these forbid are left out.
+- a range by flight, and stocks: with bases PyVRP reloads as often as it likes, whatever the distance, and
+  OR-Tools does not;
+- endurance, commitments, wind's air lengths, what decays, first shares, makespan and changes: plans are flown
+  by our rules, and visits that these forbid are left out.
 
 They are extras: ``pip install -e ".[compare]"``.
 """
@@ -31,24 +33,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import NamedTuple
 
 import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.reproduction.errors import MissingPackage
+from app.reproduction.optimiser_model import RESOLUTION, UNLIMITED, Model, model_of
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.legs import UNREACHABLE
 from app.simulation.simulator import act, end_step, new_episodes, verdict
-from app.simulation.stacks import alike, without_reloads
+from app.simulation.stacks import without_reloads
 from app.simulation.visit import ALLOWED
-
-_RESOLUTION = 1e5
-"""Units of distance and of time that the problem's extent has; both optimisers count in integers."""
-
-_UNLIMITED = 2**40
 
 _VISIT = 1000
 """Units of a visit in PyVRP, where one unit too many costs 1e5 at most: less than the prize of a client."""
@@ -66,119 +63,19 @@ def require(package: str) -> None:
         raise MissingPackage(f'{package} is not installed: .venv/bin/pip install -e ".[compare]"')
 
 
-class _Model(NamedTuple):
-    """A problem in integers: nodes are N targets, M current positions and M starting points.
-
-    Attributes
-    ----------
-    clients
-        (C,) the target of each client that is worth a visit.
-    like
-        (M,) the first UAV with the same position, speed, range and loads.
-    distance, duration, charged
-        By UAV, (nodes, nodes): flown, passed (service with the leg to it), and paid for; legs home are 0
-        where they do not count.
-    longest
-        (M,) what may be flown.
-    earliest, latest
-        (N,) times at which service may end.
-    ready
-        (M,) when a UAV sets out.
-    prize, share
-        (C,) reward, and share of the target's need.
-    load, need
-        (M, K) and (C, K).
-    most_clients
-        Of one target.
-    """
-
-    clients: list[int]
-    like: list[int]
-    distance: dict[int, Floats]
-    duration: dict[int, Floats]
-    charged: dict[int, Floats]
-    longest: Floats
-    earliest: Floats
-    latest: Floats
-    ready: Floats
-    prize: Floats
-    share: Floats
-    load: Floats
-    need: Floats
-    most_clients: int
-
-
-def _model(problem: Problem, arrays: ProblemArrays, *, by_material: bool) -> _Model:
-    m, n, k = arrays.shape
-    per_distance = _RESOLUTION / max(problem.extent, 1e-9)
-    per_time = per_distance * float(arrays.uavs["speed"].mean())
-    amounts = 1000 if max(arrays.load.max(), arrays.need.max()) < 1e6 else 1
-    like = alike(arrays).tolist()
-    distance, duration, charged = {}, {}, {}
-    service = np.zeros((n + 2 * m, n + 2 * m))
-    service[:, :n] = arrays.areas["service"][0]
-    np.fill_diagonal(service, 0.0)
-    for i in set(like):
-        legs = np.zeros((n + 2 * m, n + 2 * m))
-        uav = arrays.uavs[0, i]
-        legs[:n, :n] = arrays.between[0, uav["leg_class"]]
-        legs[n + i, :n] = arrays.start_target[0, i]
-        times = legs / uav["speed"]
-        if arrays.terms["timed"][0]:
-            times[:n, :n] = arrays.between_time[0, uav["leg_class"]]
-            times[n + i, :n] = arrays.start_time[0, i]
-        barred = arrays.kept_range[0, i] >= UNREACHABLE
-        for matrix in (legs, times):
-            matrix[:, :n][:, barred] = UNREACHABLE
-            np.fill_diagonal(matrix, 0.0)
-        home = legs.copy()
-        home[:n, n + m + i] = arrays.home[0, i]
-        distance[i] = _whole(per_distance * (home if problem.objective.return_to_base else legs))
-        duration[i] = _whole(per_time * (times + service))
-        paid = home if problem.objective.charge_return else legs
-        charged[i] = np.minimum(paid, _UNLIMITED / per_distance)
-    latest = np.where(
-        np.isfinite(arrays.areas["deadline"][0]), arrays.areas["deadline"][0] * per_time, _UNLIMITED
-    )
-    total, opens = arrays.areas["need_total"][0], arrays.areas["earliest"][0]
-    worth = [j for j in range(n) if total[j] > 0 and arrays.areas["level"][0, j] > 0 and latest[j] >= 0]
-    need = np.ceil(amounts * arrays.need[0] - 1e-9)
-    clients, needs = worth, need[worth]
-    if by_material:
-        pairs = [(j, material) for j in worth for material in range(k) if need[j, material] > 0]
-        clients = [j for j, _ in pairs]
-        needs = np.array([np.where(np.arange(k) == material, need[j], 0) for j, material in pairs])
-    share = needs.reshape(-1, k).sum(axis=1) / np.maximum(need[clients].reshape(-1, k).sum(axis=1), 1)
-    return _Model(
-        clients=clients,
-        like=like,
-        distance=distance,
-        duration=duration,
-        charged=charged,
-        longest=np.maximum(0, np.floor(per_distance * (arrays.uavs["voyage"][0] - arrays.uavs["dis"][0]))),
-        earliest=_whole(per_time * np.where(opens > 0, opens + arrays.areas["service"][0], 0.0)),
-        latest=np.floor(latest + np.ceil(per_time * arrays.areas["service"][0])),
-        ready=_whole(per_time * arrays.uavs["ready"][0]),
-        prize=arrays.areas["level"][0][clients] * share,
-        share=share,
-        load=np.floor(amounts * arrays.load[0] + 1e-9),
-        need=needs,
-        most_clients=max((clients.count(j) for j in worth), default=1),
-    )
-
-
-def _whole(units: Floats) -> Floats:
-    """Return whole units, rounded up; what is longer than anything may be is that long."""
-    return np.minimum(np.ceil(units), _UNLIMITED)
-
-
 def _better_plan(
-    problem: Problem, seconds: float, solve: Callable[[ProblemArrays, _Model, float], list[list[int]]]
+    problem: Problem,
+    seconds: float,
+    solve: Callable[[ProblemArrays, Model, float], list[list[int]]],
+    *,
+    reloads: bool,
 ) -> Plan:
     """Solve both models in half of the time each, if they differ; return the better plan, by its reward."""
-    arrays = without_reloads(compile_problem(problem))
+    arrays = compile_problem(problem)
+    if not reloads:
+        arrays = without_reloads(arrays)
     empty = Plan.empty(problem.n_uavs, problem.n_targets)
-    models = [_model(problem, arrays, by_material=by_material) for by_material in (False, True)]
+    models = [model_of(problem, arrays, by_material=by_material) for by_material in (False, True)]
     if not models[0].clients or all(uav.ret for uav in problem.uavs):
         return empty
     if models[1].most_clients == 1:
@@ -210,21 +107,21 @@ def _flown(problem: Problem, arrays: ProblemArrays, routes: list[list[int]]) -> 
 def pyvrp_plan(problem: Problem, seconds: float, seed: int) -> Plan:
     """Return PyVRP's plan: heterogeneous vehicles, optional clients with prizes, time windows."""
 
-    def solve(arrays: ProblemArrays, model: _Model, seconds: float) -> list[list[int]]:
+    def solve(arrays: ProblemArrays, model: Model, seconds: float) -> list[list[int]]:
         return _pyvrp_routes(problem, arrays, model, seconds, seed)
 
-    return _better_plan(problem, seconds, solve)
+    return _better_plan(problem, seconds, solve, reloads=True)
 
 
 def _pyvrp_routes(
-    problem: Problem, arrays: ProblemArrays, model: _Model, seconds: float, seed: int
+    problem: Problem, arrays: ProblemArrays, model: Model, seconds: float, seed: int
 ) -> list[list[int]]:
     import pyvrp  # noqa: PLC0415 - an extra
     from pyvrp.stop import MaxRuntime  # noqa: PLC0415 - an extra
 
     m, n, _ = arrays.shape
     weight, speeds = float(arrays.terms["weight"][0]), arrays.uavs["speed"][0]
-    per_distance = _RESOLUTION / max(problem.extent, 1e-9)
+    per_distance = RESOLUTION / max(problem.extent, 1e-9)
     # Prizes must not be worth more than the penalties, of 1e5 a unit at most, that keep routes feasible.
     scale = 1e7 / max(float(arrays.areas["level"].max()), 1e-12)
     unit = {i: weight * speeds[i] / speeds.mean() / per_distance for i in model.distance}
@@ -241,9 +138,19 @@ def _pyvrp_routes(
         ).astype(np.int64)
         for i in types
     ]
+    distances = [model.distance[i].astype(np.int64) for i in types]
     refund = weight * float(speeds.mean()) * arrays.areas["service"][0][model.clients] * model.share
-    locations = [pyvrp.Location(0, 0) for _ in range(n + 2 * m)]
+    bases = arrays.n_bases
+    if bases:
+        # Nothing limits the distance of a route, so it can be what is paid for; turnarounds cost nothing.
+        distances = [np.ceil(model.charged[i] * per_distance).astype(np.int64) for i in types]
+        durations = [model.duration[i].astype(np.int64) for i in types]
+        refund = np.zeros(len(model.clients))
+    locations = [pyvrp.Location(0, 0) for _ in range(n + 2 * m + bases)]
     depots = [pyvrp.Depot(n + q) for q in range(2 * m)]
+    depots += [
+        pyvrp.Depot(n + 2 * m + d, service_duration=int(time)) for d, time in enumerate(model.turnaround)
+    ]
     clients = [
         pyvrp.Client(
             location=j,
@@ -264,42 +171,47 @@ def _pyvrp_routes(
             ],
             start_depot=i,
             end_depot=m + i,
-            max_distance=int(model.longest[i]),
+            max_distance=UNLIMITED if bases else int(model.longest[i]),
             tw_early=int(model.ready[i]),
+            tw_late=int(model.until[i]),
             # Who need not be anywhere early takes off later, rather than waits on the way.
-            start_late=int(model.ready[i]) if not model.earliest.any() else _UNLIMITED,
-            unit_distance_cost=0,
+            start_late=int(model.ready[i] if not model.earliest.any() else model.until[i]),
+            reload_depots=[
+                2 * m + d for d in range(bases) if arrays.kept_range[0, i, n + 1 + d] < UNREACHABLE
+            ],
             # Where distance costs nothing it still breaks ties.
-            unit_duration_cost=max(1, round(scale * unit[i])),
+            unit_distance_cost=max(1, round(scale * weight / per_distance)) if bases else 0,
+            unit_duration_cost=0 if bases else max(1, round(scale * unit[i])),
             profile=p,
         )
         for p, i in enumerate(types)
     ]
-    data = pyvrp.ProblemData(
-        locations, clients, depots, vehicles, [model.distance[i].astype(np.int64) for i in types], durations
-    )
+    data = pyvrp.ProblemData(locations, clients, depots, vehicles, distances, durations)
     found = pyvrp.solve(data, MaxRuntime(seconds), seed=seed, display=False).best
     free = {i: list(members[i]) for i in types}
     routes: list[list[int]] = [[] for _ in range(m)]
     if found.is_feasible():
         for route in found.routes():
-            visits = [model.clients[each.idx] for each in route if each.is_client()]
-            routes[free[types[route.vehicle_type()]].pop()] = visits
+            # Of the depots only those between are bases: the route begins and ends at others.
+            stops = [
+                model.clients[each.idx] if each.is_client() else n + 1 + each.idx - 2 * m
+                for each in route
+                if each.is_client() or each.idx >= 2 * m
+            ]
+            routes[free[types[route.vehicle_type()]].pop()] = stops
     return routes
 
 
 def routing_plan(problem: Problem, seconds: float, seed: int) -> Plan:  # noqa: ARG001 - it draws nothing
     """Return the plan of OR-Tools routing: guided local search, disjunctions with penalties."""
 
-    def solve(arrays: ProblemArrays, model: _Model, seconds: float) -> list[list[int]]:
+    def solve(arrays: ProblemArrays, model: Model, seconds: float) -> list[list[int]]:
         return _routing_routes(problem, arrays, model, seconds)
 
-    return _better_plan(problem, seconds, solve)
+    return _better_plan(problem, seconds, solve, reloads=False)
 
 
-def _routing_routes(
-    problem: Problem, arrays: ProblemArrays, model: _Model, seconds: float
-) -> list[list[int]]:
+def _routing_routes(problem: Problem, arrays: ProblemArrays, model: Model, seconds: float) -> list[list[int]]:
     from ortools.constraint_solver import pywrapcp, routing_enums_pb2  # noqa: PLC0415 - an extra
 
     m, n, k = arrays.shape
@@ -343,9 +255,9 @@ def _routing_routes(
     model_.AddDimensionWithVehicleTransitAndCapacity(
         [of_uav("distance", i) for i in out], 0, longest, True, "distance"
     )
-    slack = _UNLIMITED if model.earliest.any() else 0
+    slack = UNLIMITED if model.earliest.any() else 0
     model_.AddDimensionWithVehicleTransits(
-        [of_uav("time", i) for i in out], slack, _UNLIMITED, not model.ready.any(), "time"
+        [of_uav("time", i) for i in out], slack, UNLIMITED, not model.ready.any(), "time"
     )
     times = model_.GetDimensionOrDie("time")
     for q, i in enumerate(out):

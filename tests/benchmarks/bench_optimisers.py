@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
 
@@ -37,7 +38,22 @@ def auto_plan(problem: Problem, seconds: float, seed: int) -> Plan:
     return solver.solve(problem, seed, Deadline(seconds), lambda _progress: None).plan
 
 
-EVERY = {**FAMILIES, **WORLD_FAMILIES}
+def reloads(n_uavs: int, n_targets: int, n_materials: int, rng: np.random.Generator) -> Problem:
+    """As `sorties` with whole needs and windows, where capacity and time are short and range is not."""
+    problem = WORLD_FAMILIES["sorties"](n_uavs, n_targets, n_materials, rng)
+    most = np.array([t.loadlist for t in problem.targets]).max(axis=0)
+    load = tuple((most * float(rng.uniform(1.5, 3.0))).tolist())
+    opens = rng.uniform(0, 3.0, n_targets) * (rng.random(n_targets) < 0.7)
+    stays = rng.uniform(1.0, 3.0, n_targets)
+    targets = tuple(
+        replace(t, earliest=float(at), deadline=float(at + stay), service_time=float(rng.uniform(0.02, 0.1)))
+        for t, at, stay in zip(problem.targets, opens, stays, strict=True)
+    )
+    uavs = tuple(replace(u, voyage=1e3, loadlist=load) for u in problem.uavs)
+    return replace(problem, uavs=uavs, targets=targets, max_steps=40)
+
+
+EVERY = {**FAMILIES, **WORLD_FAMILIES, "reloads": reloads}
 OPTIMISERS = {"auto": auto_plan, "PyVRP": pyvrp_plan, "OR-Tools": routing_plan}
 
 
