@@ -5,6 +5,7 @@ from dataclasses import replace
 import highspy
 import numpy as np
 import pytest
+from loading_program import best_by_program
 from problems import random_problem
 from referee import Illegal, replay
 
@@ -17,6 +18,7 @@ from app.simulation.evaluation import reward_of
 from app.simulation.explain import explain
 from app.simulation.generator import generate
 from app.simulation.planned_amounts import best_amounts
+from app.simulation.worth import satisfaction_of
 
 
 def worth(problem, delivered, actions):
@@ -91,6 +93,21 @@ def test_the_amounts_are_the_best_for_the_routes():
             assert np.all(delivered[actions == j].sum(axis=0) <= np.array(target.loadlist) * (1 + 1e-9))
         best = by_linear_program(problem, actions)
         assert worth(problem, delivered, actions) == pytest.approx(best, rel=1e-7, abs=1e-7)
+
+
+def test_a_first_share_that_earns_more_is_brought_first():
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        problem = scarce(rng)
+        share, more = float(rng.uniform(0, 1)), float(rng.uniform(1, 4))
+        problem = replace(problem, objective=Objective(minimum_share=share, minimum_weight=more))
+        arrays, actions = compile_problem(problem), random_routes(rng, problem)
+        met = np.zeros((problem.n_targets, problem.n_materials))
+        delivered = best_amounts(arrays, actions).delivered
+        for s, i in np.argwhere(actions < problem.n_targets):
+            met[actions[s, i]] += delivered[s, i]
+        best = best_by_program(problem_to_record(problem), actions.tolist())
+        assert satisfaction_of(arrays, met) == pytest.approx(best, rel=1e-7, abs=1e-7)
 
 
 def test_a_chain_of_uavs_takes_over_from_each_other():

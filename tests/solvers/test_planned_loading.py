@@ -174,6 +174,22 @@ def test_what_is_of_no_use_goes():
         objective=Objective(distance_weight=0.1, unloading="planned", loading="planned"),
         max_steps=5,
     )
-    # The second flight finds nothing in stock; the last reload has no flight.
+    # The second flight finds nothing in stock, and the last reload has no flight.
     plan = without_useless(compile_problem(problem), np.array([[0], [3], [1], [4], [2]]))
     assert plan[:, 0].tolist() == [0, 2, 2, 2, 2]
+
+
+def test_a_reload_that_leaves_something_behind_stays():
+    problem = Problem(
+        uavs=(
+            UAV("u1", 0, 0, 0, 0, 1.0, 1.0, (2.0,)),
+            UAV("u2", 0, 0, 0, 0, 1.0, 10.0, (0.0,)),
+        ),
+        targets=(Target("far", 3, 0, 1.0, (2.0,)),),
+        bases=(Base("base-1", 0, 0, stock=(0.0,)),),
+        objective=Objective(distance_weight=0.01, unloading="planned", loading="planned"),
+        max_steps=2,
+    )
+    solution = solve(problem)
+    assert solution.plan.assignment == ((2, 2), (1, 0))
+    assert solution.proof.proven

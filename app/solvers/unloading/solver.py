@@ -84,13 +84,9 @@ class PlannedUnloading:
             incumbent.consider(Plan(problem.start_plan))
 
         tiny = bool(problem.bases) and is_tiny(incumbent.arrays) and amounts_are_exact(incumbent.arrays)
-        share = (
-            _ALGORITHM_SHARE_TINY
-            if tiny
-            else _ALGORITHM_SHARE_LOADING
-            if problem.plans_loading
-            else _ALGORITHM_SHARE
-        )
+        share = _ALGORITHM_SHARE_LOADING if problem.plans_loading else _ALGORITHM_SHARE
+        if tiny:
+            share = _ALGORITHM_SHARE_TINY
 
         def told(progress: Progress) -> None:
             incumbent.consider(progress.incumbent)
@@ -166,16 +162,19 @@ def greedily(problem: Problem) -> Problem:
 def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
     """Take the stops out of a plan that are of no use when everything is unloaded at best.
 
-    These are visits that unload nothing, and reloads without a visit before the next one. Mostly the way
-    without a stop is not longer and not later; the deliveries stay possible.
+    These are visits that unload nothing, and reloads without a visit before the next one that leave nothing
+    behind. Mostly the way without a stop is not longer and not later; the deliveries stay possible.
     """
     home = arrays.shape[1]
     while True:
-        useless = (actions < home) & ~(best_amounts(arrays, actions).delivered > 0).any(axis=2)
+        amounts = best_amounts(arrays, actions)
+        useless = (actions < home) & ~(amounts.delivered > 0).any(axis=2)
+        leaves = (amounts.loaded < 0).any(axis=2)
         shorter = np.full_like(actions, home)
         for i in range(actions.shape[1]):
-            route = actions[(actions[:, i] != home) & ~useless[:, i], i]
-            idle = (route > home) & np.append(route[1:] > home, True)
+            kept = np.flatnonzero((actions[:, i] != home) & ~useless[:, i])
+            route = actions[kept, i]
+            idle = (route > home) & np.append(route[1:] > home, True) & ~leaves[kept, i]
             route = route[~idle]
             shorter[: len(route), i] = route
         if np.array_equal(shorter, actions):
