@@ -44,8 +44,7 @@ def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
     by_flow = Amounts(_by_flow(arrays, actions), np.zeros((*actions.shape, arrays.shape[2])))
     if not arrays.terms["plans_loading"][0]:
         return by_flow
-    too_large = int((actions != arrays.shape[1]).sum()) * arrays.shape[2] > _LARGEST_PROGRAM
-    if too_large or _is_flow(arrays):
+    if how_many(arrays, actions) > _LARGEST_PROGRAM or _is_flow(arrays, by_flow):
         return in_turn(arrays, actions, by_flow)
     key = actions.shape, actions.tobytes()
     for need, known, amounts in tuple(_solved):
@@ -68,9 +67,22 @@ def amounts_are_exact(arrays: ProblemArrays) -> bool:
     return unlimited and bool((arrays.load[0] <= arrays.full[0]).all())
 
 
-def _is_flow(arrays: ProblemArrays) -> bool:
-    """Whether nothing limits the amounts but capacities and needs, so that those of the flow are the best."""
-    return not arrays.load.any() and bool(np.isinf(arrays.stock[0]).all())
+def how_many(arrays: ProblemArrays, actions: Integers) -> int:
+    """Return how many amounts a plan has."""
+    return int((actions != arrays.shape[1]).sum()) * arrays.shape[2]
+
+
+def _is_flow(arrays: ProblemArrays, by_flow: Amounts) -> bool:
+    """Whether nothing limits the amounts but capacities and needs, so that those of the flow are the best.
+
+    Of a single base no flight has more than another, so a stock that is not used up limits nothing.
+    """
+    if arrays.load.any():
+        return False
+    if np.isinf(arrays.stock[0]).all():
+        return True
+    used = by_flow.delivered.sum(axis=(0, 1))
+    return arrays.n_bases == 1 and bool((used < (1.0 - ROUNDING) * arrays.stock[0, 0]).all())
 
 
 def _by_flow(arrays: ProblemArrays, actions: Integers) -> Floats:

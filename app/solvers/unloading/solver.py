@@ -9,9 +9,9 @@ import numpy as np
 
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import ProblemArrays, compile_problem
+from app.simulation.arrays import Flags, ProblemArrays, compile_problem
 from app.simulation.evaluation import replay_at_best
-from app.simulation.planned_amounts import amounts_are_exact, best_amounts
+from app.simulation.planned_amounts import amounts_are_exact, best_amounts, how_many
 from app.simulation.visit import ALLOWED
 from app.solvers.bound.enumeration import is_tiny
 from app.solvers.floor import nothing_to_fly
@@ -40,6 +40,9 @@ _MOST_WORK = 60e6
 
 _LONGEST = 25
 """Times as many of both, at most, for which a search with reloads goes on under a time limit."""
+
+_MOST_AT_A_GLANCE = 1_000
+"""Amounts of a plan up to which a linear program for them takes some milliseconds."""
 
 _PIECE_WORK = 100e3
 """Visits looked at between two looks at the stop criterion: about 2 ms."""
@@ -89,7 +92,7 @@ class PlannedUnloading:
             share = _ALGORITHM_SHARE_TINY
 
         def told(progress: Progress) -> None:
-            incumbent.consider(progress.incumbent)
+            incumbent.glance_at(progress.incumbent)
             report(Progress(share * progress.fraction, progress.epoch, incumbent.reward, incumbent.plan))
 
         solution = self.algorithm.solve(greedy, seed, share_of_time(stop, share), told)
@@ -124,6 +127,11 @@ class _Incumbent:
             return
         self._last = plan
         self.consider_actions(plan.as_array())
+
+    def glance_at(self, plan: Plan) -> None:
+        """As :meth:`consider`, unless that takes long: of large plans the last one of a search is enough."""
+        if how_many(self.arrays, plan.as_array()) <= _MOST_AT_A_GLANCE:
+            self.consider(plan)
 
     def consider_actions(self, actions: Actions) -> None:
         """As :meth:`consider`, for (S, M) joint actions."""
@@ -169,7 +177,7 @@ def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
     while True:
         amounts = best_amounts(arrays, actions)
         useless = (actions < home) & ~(amounts.delivered > 0).any(axis=2)
-        leaves = (amounts.loaded < 0).any(axis=2)
+        leaves: Flags = (amounts.loaded < 0).any(axis=2)
         shorter = np.full_like(actions, home)
         for i in range(actions.shape[1]):
             kept = np.flatnonzero((actions[:, i] != home) & ~useless[:, i])
