@@ -20,9 +20,8 @@ PROBLEM = {
 }
 
 
-@pytest.fixture
-def shown(page, service):
-    """The page with a plan in which a UAV reloads, and the answer."""
+def show(page, service):
+    """Show a plan in which a UAV reloads; the page and the answer."""
     ready(page)
     open_problem(page, PROBLEM)
     answer = show_answer(page, service.url)
@@ -31,8 +30,20 @@ def shown(page, service):
     return page, answer
 
 
-def test_the_routes_have_reloads_and_flights(shown):
-    page, answer = shown
+@pytest.fixture(scope="module")
+def seen(shared_page, service):
+    """The page with such a plan, to be looked at."""
+    return show(shared_page, service)
+
+
+@pytest.fixture
+def shown(page, service):
+    """The page with such a plan, to be worked with."""
+    return show(page, service)
+
+
+def test_the_routes_have_reloads_and_flights(seen):
+    page, answer = seen
     first, reload, last = page.locator("#routes tbody tr").all()
     expect(first).to_contain_text("2 flights")
     expect(first).to_contain_text("to base Depot")
@@ -48,8 +59,8 @@ def test_the_routes_have_reloads_and_flights(shown):
     assert answer["bases"] == [{"base_id": "a", "stock": [5.0]}]
 
 
-def test_the_timeline_has_turnarounds(shown):
-    page, _ = shown
+def test_the_timeline_has_turnarounds(seen):
+    page, _ = seen
     bars = page.locator('.timeline li[data-uav-id="u"] .track span')
     titles = bars.evaluate_all("all => all.map((each) => [each.className, each.title])")
     assert titles[:5] == [
@@ -62,8 +73,8 @@ def test_the_timeline_has_turnarounds(shown):
     assert titles[5] == ["leg", "flight 2, to b"]
 
 
-def test_the_map_has_a_line_a_flight_and_the_base(shown):
-    page, _ = shown
+def test_the_map_has_a_line_a_flight_and_the_base(seen):
+    page, _ = seen
     lines = page.locator("path.route").evaluate_all("all => all.map((each) => each.dataset.flight)")
     assert lines == ["1", "2"]
     assert page.locator(".order").all_inner_texts() == ["1", "2", "3"]

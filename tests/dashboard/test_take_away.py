@@ -20,12 +20,22 @@ def saved(page, button):
     return caught.value.suggested_filename, Path(caught.value.path()).read_bytes()
 
 
-@pytest.fixture
-def planned(page, service):
+def plan(page, service):
     ready(page)
     answer = show_answer(page, service.url, algorithm="greedy")
     go(page, "take-away")
     return page, answer
+
+
+@pytest.fixture
+def planned(page, service):
+    return plan(page, service)
+
+
+@pytest.fixture(scope="module")
+def planned_once(shared_page, service):
+    """The same for tests that choose nothing."""
+    return plan(shared_page, service)
 
 
 def test_flight_files_of_all_uavs(planned):
@@ -76,8 +86,8 @@ def test_waypoints_of_one_uav_load_in_pymavlink(planned, service, tmp_path):
 
 
 @pytest.mark.parametrize("format", ["geojson", "csv", "load-sheet", "html"])
-def test_documents_are_the_services(planned, service, format):
-    page, answer = planned
+def test_documents_are_the_services(planned_once, service, format):
+    page, answer = planned_once
 
     _, content = saved(page, format)
 
@@ -85,8 +95,8 @@ def test_documents_are_the_services(planned, service, format):
     assert content == response.content
 
 
-def test_page_to_print_has_every_stop(planned):
-    page, answer = planned
+def test_page_to_print_has_every_stop(planned_once):
+    page, answer = planned_once
     with page.context.expect_page() as opened:
         page.get_by_test_id("print").click()
     printed = opened.value
