@@ -166,7 +166,7 @@ GREEDY = {**PROBLEM, "algorithm": "greedy"}
 
 @pytest.fixture(scope="module")
 def life(tmp_path_factory):
-    """A service with keys: what it was asked, its backup between two answers, and its log when it has ended."""
+    """A service with keys: what it was asked, a backup between two answers, its log when it has ended."""
     folder = tmp_path_factory.mktemp("life")
     copy = folder / "elsewhere" / "backup.sqlite3"
     copy.parent.mkdir()

@@ -20,8 +20,17 @@ PROBLEM = {
 }
 
 
-def show(page, service):
-    """Show a plan in which a UAV reloads; the page and the answer."""
+@pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins by opening a problem, which replaces what another has left."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    return shared_page
+
+
+@pytest.fixture
+def shown(page, service):
+    """The page with a plan in which a UAV reloads, and the answer."""
     ready(page)
     open_problem(page, PROBLEM)
     answer = show_answer(page, service.url)
@@ -30,20 +39,8 @@ def show(page, service):
     return page, answer
 
 
-@pytest.fixture(scope="module")
-def seen(shared_page, service):
-    """The page with such a plan, to be looked at."""
-    return show(shared_page, service)
-
-
-@pytest.fixture
-def shown(page, service):
-    """The page with such a plan, to be worked with."""
-    return show(page, service)
-
-
-def test_the_routes_have_reloads_and_flights(seen):
-    page, answer = seen
+def test_the_routes_have_reloads_and_flights(shown):
+    page, answer = shown
     first, reload, last = page.locator("#routes tbody tr").all()
     expect(first).to_contain_text("2 flights")
     expect(first).to_contain_text("to base Depot")
@@ -59,8 +56,8 @@ def test_the_routes_have_reloads_and_flights(seen):
     assert answer["bases"] == [{"base_id": "a", "stock": [5.0]}]
 
 
-def test_the_timeline_has_turnarounds(seen):
-    page, _ = seen
+def test_the_timeline_has_turnarounds(shown):
+    page, _ = shown
     bars = page.locator('.timeline li[data-uav-id="u"] .track span')
     titles = bars.evaluate_all("all => all.map((each) => [each.className, each.title])")
     assert titles[:5] == [
@@ -73,8 +70,8 @@ def test_the_timeline_has_turnarounds(seen):
     assert titles[5] == ["leg", "flight 2, to b"]
 
 
-def test_the_map_has_a_line_a_flight_and_the_base(seen):
-    page, _ = seen
+def test_the_map_has_a_line_a_flight_and_the_base(shown):
+    page, _ = shown
     lines = page.locator("path.route").evaluate_all("all => all.map((each) => each.dataset.flight)")
     assert lines == ["1", "2"]
     assert page.locator(".order").all_inner_texts() == ["1", "2", "3"]

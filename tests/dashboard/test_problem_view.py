@@ -42,6 +42,7 @@ def show(page):
     def shown(problem, suffix="json"):
         content = problem if isinstance(problem, str) else json.dumps(problem)
         name = f"case-{next(_numbers)}"
+        page.click("#tab-problem")
         page.locator("#import").set_input_files(
             {"name": f"{name}.{suffix}", "mimeType": "text/plain", "buffer": content.encode()}
         )
