@@ -44,6 +44,16 @@ def expected_state(problem, answer, time):
     return uavs, needs
 
 
+@pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins with the problem that a new page has."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    open_problem(shared_page, example_problem("cyclone-idai"), "cyclone-idai")
+    yield shared_page
+    shared_page.unroute_all()
+
+
 def moment(page, **mission):
     """What the page makes of a moment of the plan on screen."""
     return page.evaluate(
