@@ -7,7 +7,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 from pymavlink import mavwp
 
@@ -20,22 +20,18 @@ def saved(page, button):
     return caught.value.suggested_filename, Path(caught.value.path()).read_bytes()
 
 
-def plan(page, service):
-    ready(page)
-    answer = show_answer(page, service.url, algorithm="greedy")
-    go(page, "take-away")
-    return page, answer
+@pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins with the problem that a new page has."""
+    return begin_again(shared_page)
 
 
 @pytest.fixture
 def planned(page, service):
-    return plan(page, service)
-
-
-@pytest.fixture(scope="module")
-def planned_once(shared_page, service):
-    """The same for tests that choose nothing."""
-    return plan(shared_page, service)
+    answer = show_answer(page, service.url, algorithm="greedy")
+    go(page, "take-away")
+    page.locator("select[name=uav]").select_option("")
+    return page, answer
 
 
 def test_flight_files_of_all_uavs(planned):
@@ -86,8 +82,8 @@ def test_waypoints_of_one_uav_load_in_pymavlink(planned, service, tmp_path):
 
 
 @pytest.mark.parametrize("format", ["geojson", "csv", "load-sheet", "html"])
-def test_documents_are_the_services(planned_once, service, format):
-    page, answer = planned_once
+def test_documents_are_the_services(planned, service, format):
+    page, answer = planned
 
     _, content = saved(page, format)
 
@@ -95,8 +91,8 @@ def test_documents_are_the_services(planned_once, service, format):
     assert content == response.content
 
 
-def test_page_to_print_has_every_stop(planned_once):
-    page, answer = planned_once
+def test_page_to_print_has_every_stop(planned):
+    page, answer = planned
     with page.context.expect_page() as opened:
         page.get_by_test_id("print").click()
     printed = opened.value
