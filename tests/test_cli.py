@@ -12,6 +12,7 @@ import time
 import tomllib
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -132,105 +133,111 @@ def test_others_are_not_served_without_a_usable_key(invoke, revoked):
     assert "--no-keys" in refused.stderr
 
 
-@pytest.fixture
-def serve(tmp_path):
-    """Starts ``python -m app serve`` on a free port, its log in a file, and waits until it answers."""
-    running = []
-
-    def start(**environment):
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            port = probe.getsockname()[1]
-        log = tmp_path / f"log-{port}"
-        command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(tmp_path)]
-        with log.open("wb") as stderr:
-            process = subprocess.Popen(
-                command, stderr=stderr, cwd=ROOT, env=os.environ | ONE_WORKER | environment
-            )
-        client = httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=START_S)
-        running.append((process, client))
+@contextlib.contextmanager
+def serving(folder, **environment):
+    """Start ``python -m app serve`` on a free port, its log in a file, and wait until it answers."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    log = folder / f"log-{port}"
+    command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(folder)]
+    with log.open("wb") as stderr:
+        process = subprocess.Popen(
+            command, stderr=stderr, cwd=ROOT, env=os.environ | ONE_WORKER | environment
+        )
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=START_S) as client:
         deadline = time.monotonic() + START_S
         while True:
             with contextlib.suppress(httpx.TransportError):
                 client.get("/healthz")
-                return client, process, log
+                break
             assert process.poll() is None, log.read_text()
             assert time.monotonic() < deadline
             threading.Event().wait(0.05)
+        try:
+            yield client, process, log
+        finally:
+            process.kill()
+            process.wait()
 
-    yield start
-    for process, client in running:
-        client.close()
-        process.kill()
-        process.wait()
+
+PROBLEM = json.loads((ROOT / "app/examples/paper-5x10.json").read_text("utf-8"))
+GREEDY = {**PROBLEM, "algorithm": "greedy"}
 
 
-def test_the_log_tells_of_requests_and_jobs_and_never_of_keys(invoke, serve):
+@pytest.fixture(scope="module")
+def life(tmp_path_factory):
+    """A service with keys: what it was asked, a backup between two answers, its log when it has ended."""
+    folder = tmp_path_factory.mktemp("life")
+    copy = folder / "elsewhere" / "backup.sqlite3"
+    copy.parent.mkdir()
+
+    def invoke(*arguments):
+        return CliRunner().invoke(application, [*arguments, "--data-dir", str(folder)])
+
     tokens = [
         invoke("keys", "create", "--role", role, "--name", "x").stdout.strip()
         for role in ("allocate", "library")
     ]
-    client, process, log = serve(ALLOCATOR_LOG_LEVEL="debug")
-    sent = {"Authorization": f"Bearer {tokens[0]}"}
-    problem = json.loads((ROOT / "app/examples/paper-5x10.json").read_text("utf-8"))
+    with serving(folder, ALLOCATOR_LOG_LEVEL="debug") as (client, process, log):
+        sent = {"Authorization": f"Bearer {tokens[0]}"}
 
-    def ask(method, path, **options):
-        return client.request(method, path, **options).headers["x-request-id"]
+        def ask(method, path, **options):
+            return client.request(method, path, **options).headers["x-request-id"]
 
-    asked = client.post("/allocate", json={**problem, "algorithm": "greedy"}, headers=sent)
-    assert asked.status_code == 200, asked.text
-    ids = [
-        asked.headers["x-request-id"],
-        ask("GET", "/jobs", headers=sent),
-        ask("DELETE", "/library/x", headers=sent),
-        ask("GET", "/jobs", headers={"Authorization": f"Basic {tokens[1]}"}),
-        ask("GET", "/jobs", params={"key": tokens[1], "cursor": tokens[0]}, headers=sent),
-        ask("POST", "/allocate", json={"key": tokens[1]}, headers=sent),
-        ask("GET", "/a%0Ab%1B[31m"),
-    ]
-    process.send_signal(signal.SIGTERM)
-    process.wait(START_S)
+        asked = client.post("/allocate", json=GREEDY, headers=sent)
+        ids = [
+            asked.headers["x-request-id"],
+            ask("GET", "/jobs", headers=sent),
+            ask("DELETE", "/library/x", headers=sent),
+            ask("GET", "/jobs", headers={"Authorization": f"Basic {tokens[1]}"}),
+            ask("GET", "/jobs", params={"key": tokens[1], "cursor": tokens[0]}, headers=sent),
+            ask("POST", "/allocate", json={"key": tokens[1]}, headers=sent),
+            ask("GET", "/a%0Ab%1B[31m"),
+        ]
+        policies = client.get("/library", headers=sent).json()["policies"]
+        backups = [invoke("backup", str(copy))]
+        after = client.post("/allocate", json=GREEDY, headers=sent).json()
+        backups.append(invoke("backup", str(copy)))
+        process.send_signal(signal.SIGTERM)
+        process.wait(START_S)
+        text = log.read_text("utf-8")
+    return SimpleNamespace(
+        tokens=tokens, sent=sent, asked=asked, ids=ids, policies=policies, backups=backups, after=after,
+        copy=copy, text=text,
+    )  # fmt: skip
 
-    text = log.read_text("utf-8")
-    for token in tokens:
-        assert token.partition(".")[2] not in text
-    lines = [json.loads(line) for line in text.splitlines()]
+
+def test_the_log_tells_of_requests_and_jobs_and_never_of_keys(life):
+    assert life.asked.status_code == 200, life.asked.text
+    for token in life.tokens:
+        assert token.partition(".")[2] not in life.text
+    lines = [json.loads(line) for line in life.text.splitlines()]
     for line in lines:
         assert {"time", "level", "logger", "event"} <= line.keys()
     requests = {line["request_id"]: line for line in lines if line["event"] == "request"}
-    assert [requests[given]["status"] for given in ids] == [200, 200, 403, 401, 422, 422, 401]
-    assert requests[ids[-1]]["path"] == "/a\nb\x1b[31m"
-    assert requests[ids[0]]["duration_ms"] > 0
-    job_id = asked.json()["job_id"]
+    assert [requests[given]["status"] for given in life.ids] == [200, 200, 403, 401, 422, 422, 401]
+    assert requests[life.ids[-1]]["path"] == "/a\nb\x1b[31m"
+    assert requests[life.ids[0]]["duration_ms"] > 0
+    job_id = life.asked.json()["job_id"]
     told = [line["event"] for line in lines if line.get("job_id") == job_id]
     assert told == ["job taken in", "job ended"]
-    assert ids[0] in {line.get("request_id") for line in lines if line.get("job_id") == job_id}
+    assert life.ids[0] in {line.get("request_id") for line in lines if line.get("job_id") == job_id}
 
 
-def test_a_backup_of_a_running_service_is_restored(invoke, serve, tmp_path):
-    client, process, _ = serve()
-    problem = json.loads((ROOT / "app/examples/paper-5x10.json").read_text("utf-8"))
-    before = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
-    policies = client.get("/library").json()["policies"]
-    copy = tmp_path / "elsewhere" / "backup.sqlite3"
-    copy.parent.mkdir()
-    made = invoke("backup", str(copy))
+def test_a_backup_of_a_running_service_is_restored(life, tmp_path):
+    made, again = life.backups
     assert made.exit_code == 0, made.stderr
-    after = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
-    assert invoke("backup", str(copy)).exit_code == 1
-    process.kill()
-    process.wait()
-
-    for file in tmp_path.glob("allocator.sqlite3*"):
-        file.unlink()
-    copy.rename(tmp_path / "allocator.sqlite3")
-    restored, _, _ = serve()
-
-    assert restored.get(f"/jobs/{before['job_id']}").json()["result"] == before
-    assert restored.get(f"/jobs/{after['job_id']}").status_code == 404
-    assert restored.get("/library").json()["policies"] == policies
-    for policy in policies[:3]:
-        assert restored.get(f"/library/{policy['id']}/checkpoint").status_code == 200
-    assert restored.post("/allocate", json={**problem, "algorithm": "greedy"}).status_code == 200
+    assert again.exit_code == 1
+    before, policies = life.asked.json(), life.policies
+    life.copy.rename(tmp_path / "allocator.sqlite3")
+    with serving(tmp_path) as (restored, _, _):
+        restored.headers.update(life.sent)
+        assert restored.get(f"/jobs/{before['job_id']}").json()["result"] == before
+        assert restored.get(f"/jobs/{life.after['job_id']}").status_code == 404
+        assert restored.get("/library").json()["policies"] == policies
+        for policy in policies[:3]:
+            assert restored.get(f"/library/{policy['id']}/checkpoint").status_code == 200
+        assert restored.post("/allocate", json=GREEDY).status_code == 200
 
 
 def test_a_backup_of_nothing_is_refused_and_makes_nothing(invoke, tmp_path):

@@ -114,7 +114,7 @@ def test_python_block(block, port):
 @pytest.mark.parametrize("algorithm", ["ga", "qmix", "transfer_qmix"])
 def test_the_example_is_answered_by_the_papers_algorithms(algorithm, port):
     problem = json.loads((ROOT / "app/examples/cyclone-idai.json").read_text(encoding="utf-8"))
-    request = {**problem, "algorithm": algorithm, "time_limit_s": 5}
+    request = {**problem, "algorithm": algorithm, "time_limit_s": 2}
     call = urllib.request.Request(
         f"http://127.0.0.1:{port}/allocate",
         json.dumps(request).encode(),

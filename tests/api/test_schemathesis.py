@@ -17,7 +17,7 @@ def test_every_answer_is_as_documented(start_service, tmp_path):
     process = subprocess.run(
         [
             *(str(Path(sys.executable).with_name("schemathesis")), "run", "--checks", "all"),
-            *("--mode", "all", "--max-examples", "10", "--seed", "1", "--generation-deterministic"),
+            *("--mode", "all", "--max-examples", "5", "--seed", "1", "--generation-deterministic"),
             *("--request-timeout", "120", "--wait-for-schema", "60", "--no-color"),
             *("--report", "json", "--report-json-path", str(report)),
             f"{service.client.base_url}/openapi.json",

@@ -55,7 +55,9 @@ def browsing() -> Iterator[Browser]:
 
 @pytest.fixture(scope="session")
 def service(tmp_path_factory) -> Iterator[LiveService]:
-    running = LiveService(tmp_path_factory.mktemp("dashboard"), workers=1).start()
+    """One with limits as low as these tests allow: a worker tries the largest problem before it is ready."""
+    limits = {"max_uavs": 250, "max_targets": 500}
+    running = LiveService(tmp_path_factory.mktemp("dashboard"), workers=1, **limits).start()
     try:
         yield running.await_ready()
     finally:
@@ -79,9 +81,9 @@ def pytest_runtest_teardown(item, nextitem):
         _running.close()
 
 
-@pytest.fixture
-def page(browser, service) -> Iterator[Page]:
-    """The dashboard, open; at the end nothing may have gone wrong in it, and nothing left the machine."""
+@contextmanager
+def _dashboard(browser: Browser, url: str) -> Iterator[Page]:
+    """Open the dashboard; at the end nothing may have gone wrong in it, and nothing left the machine."""
     context = browser.new_context(viewport={"width": 1366, "height": 900}, accept_downloads=True)
     context.set_default_timeout(PATIENCE_MS)
     opened = context.new_page()
@@ -91,10 +93,27 @@ def page(browser, service) -> Iterator[Page]:
     asked = []
     opened.on("request", lambda request: asked.append(request.url))
     opened.expected_troubles = []
-    opened.goto(service.url)
+    opened.goto(url)
     yield opened
     context.close()
     unexpected = [text for text in troubles if not any(known in text for known in opened.expected_troubles)]
     assert unexpected == []
-    elsewhere = [url for url in asked if not url.startswith((service.url, "data:", "blob:"))]
+    elsewhere = [asked_for for asked_for in asked if not asked_for.startswith((url, "data:", "blob:"))]
     assert elsewhere == []
+
+
+@pytest.fixture
+def page(browser, service) -> Iterator[Page]:
+    """The dashboard, opened for one test."""
+    with _dashboard(browser, service.url) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def shared_page(browser, service) -> Iterator[Page]:
+    """The dashboard, opened for all tests of a module that only look, or begin by replacing what is there.
+
+    A page takes two seconds of a core to open.
+    """
+    with _dashboard(browser, service.url) as opened:
+        yield opened

@@ -8,15 +8,29 @@ from playwright.sync_api import expect
 from referee import replay
 
 
-@pytest.fixture
-def ready(page):
+def open_example(page):
     expect(page.locator("html")).to_have_attribute("data-ready", "true")
-    page.wait_for_selector("[data-example=paper-5x10]")
+    page.click("#tab-problem")
     page.click("[data-example=paper-5x10]")
+    expect(page.locator("#problem-title")).to_contain_text("paper-5x10")
     expect(page.locator(".symbol.targets")).to_have_count(10)
     page.click("#tab-allocate")
     page.wait_for_selector("#start")
     return page
+
+
+@pytest.fixture
+def ready(page):
+    """A page on which nothing was asked yet."""
+    return open_example(page)
+
+
+@pytest.fixture
+def again(shared_page):
+    """The page of other tests, with the problem alone: the answer goes with the problem before."""
+    open_example(shared_page)
+    expect(shared_page.locator("#figures")).to_have_count(0)
+    return shared_page
 
 
 def start(page, algorithm, limit="", parameters=None):
@@ -58,8 +72,8 @@ def test_every_parameter_of_every_algorithm_can_be_set(ready, service):
                 assert float(shown) == value
 
 
-def test_the_answer_on_screen_is_the_services(ready, service):
-    page = ready
+def test_the_answer_on_screen_is_the_services(again, service):
+    page = again
     start(page, "ga", parameters={"iteration": "30"})
     page.wait_for_selector("#figures")
     job = newest_job(service)
@@ -101,17 +115,17 @@ def test_the_answer_on_screen_is_the_services(ready, service):
         assert expected["reason"] in item.inner_text()
 
 
-def test_the_transferred_policy_is_named(ready, service):
-    start(ready, "transfer_qmix", "1.5")
-    ready.wait_for_selector("#figures")
+def test_the_transferred_policy_is_named(again, service):
+    start(again, "transfer_qmix", "1.5")
+    again.wait_for_selector("#figures")
     source = newest_job(service)["result"]["source_policy"]
-    shown = ready.locator("#source")
+    shown = again.locator("#source")
     expect(shown).to_contain_text(source["name"])
     assert numbers(shown) == [source["distance"]]
 
 
-def test_the_reward_climbs_live_and_stopping_keeps_the_best(ready, service):
-    page = ready
+def test_the_reward_climbs_live_and_stopping_keeps_the_best(again, service):
+    page = again
     start(page, "ga", parameters={"iteration": "1000000"})
     page.wait_for_selector("path.route")
     expect(page.locator("#reward-chart .uplot")).to_be_visible()
@@ -158,8 +172,8 @@ def test_a_refusal_of_the_problem_leads_to_its_cell(ready):
     expect(cell).to_be_focused()
 
 
-def test_an_answer_that_is_out_of_date_says_so(ready):
-    page = ready
+def test_an_answer_that_is_out_of_date_says_so(again):
+    page = again
     start(page, "greedy")
     page.wait_for_selector("#figures")
     expect(page.locator("#stale")).to_be_hidden()
@@ -177,8 +191,8 @@ def test_the_keyboard_allocates_at_once_on_a_fresh_page(page):
     page.wait_for_selector("#figures")
 
 
-def test_an_answer_by_another_algorithm_and_its_warnings_are_shown(ready):
-    page = ready
+def test_an_answer_by_another_algorithm_and_its_warnings_are_shown(again):
+    page = again
     start(page, "greedy")
     page.wait_for_selector("#figures")
     expect(page.get_by_test_id("answered-by")).to_have_count(0)
@@ -222,8 +236,8 @@ def test_what_was_clicked_stays_under_the_pointer(ready):
     page.locator(f".symbol.targets[data-id='{unmet}']").dispatch_event("click")
 
 
-def test_the_keyboard_alone_allocates(ready):
-    page = ready
+def test_the_keyboard_alone_allocates(again):
+    page = again
     page.select_option("select[name=algorithm]", "greedy")
     page.keyboard.press("Control+Enter")
     page.wait_for_selector("#figures")
@@ -233,8 +247,8 @@ def test_the_keyboard_alone_allocates(ready):
     expect(page.locator("#tab-allocate")).to_be_focused()
 
 
-def test_the_bound_and_the_gap_to_it_are_shown_where_asked_for(ready, service):
-    page = ready
+def test_the_bound_and_the_gap_to_it_are_shown_where_asked_for(again, service):
+    page = again
     page.select_option("[data-pointer='/bound'] select", "true")
     start(page, "local_search", "2")
     page.wait_for_selector("[data-figure=Gap]")

@@ -21,6 +21,14 @@ PROBLEM = {
 
 
 @pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins by opening a problem, which replaces what another has left."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    return shared_page
+
+
+@pytest.fixture
 def shown(page, service):
     """The page with a plan in which a UAV reloads, and the answer."""
     ready(page)

@@ -9,8 +9,10 @@ from referee import replay
 CHOSEN = ("ga", "local_search", "greedy")
 
 
-@pytest.fixture
-def compared(page):
+@pytest.fixture(scope="module")
+def compared(shared_page):
+    """The page with a comparison; who takes a plan of it comes last."""
+    page = shared_page
     ready(page)
     go(page, "compare")
     for box in page.locator("#view-compare input[name=algorithm]").all():

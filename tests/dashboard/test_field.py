@@ -5,7 +5,7 @@ import json
 import httpx
 import pytest
 from answers import but_for_reasons
-from dashboard_steps import go, open_problem, ready, show_answer, state, value
+from dashboard_steps import begin_again, go, open_problem, ready, show_answer, state, value
 from page_modules import run_module
 from playwright.sync_api import expect
 from referee import replay
@@ -42,6 +42,13 @@ def expected_state(problem, answer, time):
                 flown += back
         uavs[uav["id"]] = {"dis": flown, "ret": ret, "load": load, "aim": aim, "left": left, "from": here}
     return uavs, needs
+
+
+@pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins with the problem that a new page has."""
+    yield begin_again(shared_page)
+    shared_page.unroute_all()
 
 
 def moment(page, **mission):

@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from dashboard_steps import go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 
@@ -33,6 +34,14 @@ def committed(page):
 
 def pressed(page):
     return page.locator(".lock").evaluate_all("all => all.map((each) => each.ariaPressed === 'true')")
+
+
+@pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins by opening a problem, which replaces what another has left."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    return shared_page
 
 
 def test_what_is_locked_is_seen_exported_and_kept(page, service):

@@ -92,7 +92,8 @@ def test_the_order_of_the_selected_uavs_stops_is_not_dimmed(page, service):
     assert set(others) == {"0.35"}
 
 
-def test_the_scale_covers_no_label(page):
+def test_the_scale_covers_no_label(shared_page):
+    page = shared_page
     ready(page)
     page.wait_for_selector(".leaflet-control-scale-line")
     assert page.evaluate(
@@ -107,7 +108,8 @@ def test_the_scale_covers_no_label(page):
     )
 
 
-def test_numbers_have_one_minus_sign(page):
+def test_numbers_have_one_minus_sign(shared_page):
+    page = shared_page
     ready(page)
     minus = page.evaluate(
         "async () => { const { shown } = await import('/dashboard/js/dom.js');"
@@ -116,7 +118,8 @@ def test_numbers_have_one_minus_sign(page):
     assert minus == ["−1", "−82.27"]
 
 
-def test_every_page_has_an_icon(page, service):
+def test_every_page_has_an_icon(shared_page, service):
+    page = shared_page
     ready(page)
     answer = page.request.get(f"{service.url}/favicon.ico")
     assert answer.status == 200

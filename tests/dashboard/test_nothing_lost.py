@@ -5,12 +5,18 @@ import re
 
 import httpx
 import pytest
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 
 from app.api.openapi_examples import example_problem
 
 KEPT = "html[data-kept=true]"
+
+
+@pytest.fixture
+def used(shared_page):
+    """A page that other tests have used, with the problem that a new one has."""
+    return begin_again(shared_page)
 
 
 def level(page, name="site-1"):
@@ -168,7 +174,8 @@ def test_a_browser_that_keeps_nothing_says_so_and_asks(browser, service):
 
 
 @pytest.mark.parametrize("how", ["[data-example=paper-5x10]", "button:text-is('Empty')", "file"])
-def test_what_replaces_a_mission_can_be_undone(page, service, how):
+def test_what_replaces_a_mission_can_be_undone(used, service, how):
+    page = used
     ready(page)
     set_level(page, 0.25)
     answer = show_answer(page, service.url, algorithm="greedy")
@@ -195,7 +202,8 @@ def test_what_replaces_a_mission_can_be_undone(page, service, how):
     expect(page.locator("[data-figure=Reward] data")).to_have_attribute("value", str(answer["reward"]))
 
 
-def test_undo_of_a_new_plan_brings_back_problem_plan_and_clock(page, service):
+def test_undo_of_a_new_plan_brings_back_problem_plan_and_clock(used, service):
+    page = used
     ready(page)
     show_answer(page, service.url, algorithm="greedy")
     at_a_moment(page)

@@ -37,6 +37,14 @@ def evaluated(service, visits):
 
 
 @pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins by opening a problem, which replaces what another has left."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    return shared_page
+
+
+@pytest.fixture
 def changing(page, service):
     """The page with a plan of two for `u` and one for `v`, which is being changed."""
     ready(page)

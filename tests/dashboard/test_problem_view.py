@@ -1,6 +1,10 @@
-"""The problem on the dashboard: examples, map, tables, files; what is on screen is what the service has."""
+"""The problem on the dashboard: examples, map, tables, files; what is on screen is what the service has.
+
+Tests share a page: each begins by opening a problem, which replaces what another has left.
+"""
 
 import json
+from itertools import count
 
 import httpx
 import pytest
@@ -22,17 +26,28 @@ LOCAL = {
 }  # fmt: skip
 
 
+_numbers = count(1)
+
+
+@pytest.fixture
+def page(shared_page):
+    expect(shared_page.locator("html")).to_have_attribute("data-ready", "true")
+    return shared_page
+
+
 @pytest.fixture
 def show(page):
-    """Opens a problem by its file, as a user does."""
-    expect(page.locator("html")).to_have_attribute("data-ready", "true")
+    """Opens a problem by its file, as a user does, under a name that no other had."""
 
-    def shown(problem, name="case.json"):
+    def shown(problem, suffix="json"):
         content = problem if isinstance(problem, str) else json.dumps(problem)
+        name = f"case-{next(_numbers)}"
+        page.click("#tab-problem")
         page.locator("#import").set_input_files(
-            {"name": name, "mimeType": "text/plain", "buffer": content.encode()}
+            {"name": f"{name}.{suffix}", "mimeType": "text/plain", "buffer": content.encode()}
         )
-        expect(page.locator("#problem-title")).to_contain_text(name.split(".")[0])
+        expect(page.locator("#problem-title")).to_contain_text(name)
+        return name
 
     return shown
 
@@ -61,18 +76,18 @@ def test_each_example_is_one_click_away(page, service):
 def test_files_come_back_without_loss(page, show, kind):
     show(LOCAL)
     text = exported(page, kind)
-    show(text, f"again.{kind.lower()}")
+    show(text, kind.lower())
 
     assert json.loads(exported(page, "JSON")) == LOCAL
 
 
 def test_a_file_that_cannot_be_read_is_refused_with_its_line(page, show):
-    show(LOCAL)
+    name = show(LOCAL)
     page.locator("#import").set_input_files(
         {"name": "bad.csv", "mimeType": "text/csv", "buffer": b"kind,id,x_s\nuav,a,zero\n"}
     )
     expect(page.locator(".notice.error")).to_contain_text("line 2: `x_s` is no number: zero")
-    expect(page.locator("#problem-title")).to_contain_text("case")
+    expect(page.locator("#problem-title")).to_contain_text(name)
 
 
 def test_the_table_is_edited_from_the_keyboard_and_undone(page, show):
@@ -166,6 +181,7 @@ def test_text_stands_out(page, scheme):
             });
         }"""
     )
+    page.emulate_media(color_scheme="light")
     assert {pair: ratio for pair, ratio in ratios if ratio < 4.5} == {}
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 from pymavlink import mavwp
 
@@ -21,10 +21,16 @@ def saved(page, button):
 
 
 @pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins with the problem that a new page has."""
+    return begin_again(shared_page)
+
+
+@pytest.fixture
 def planned(page, service):
-    ready(page)
     answer = show_answer(page, service.url, algorithm="greedy")
     go(page, "take-away")
+    page.locator("select[name=uav]").select_option("")
     return page, answer
 
 

@@ -62,6 +62,14 @@ STILL = {name: value for name, value in PROBLEM.items() if name != "wind"}
 
 
 @pytest.fixture
+def page(shared_page):
+    """One page for all tests: each begins by opening a problem, which replaces what another has left."""
+    ready(shared_page)
+    go(shared_page, "problem")
+    return shared_page
+
+
+@pytest.fixture
 def shown(page, service):
     """The page with a plan for the problem, and the answer."""
     ready(page)

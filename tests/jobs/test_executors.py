@@ -120,45 +120,52 @@ def test_results_errors_and_time_come_through(new_executor):
     asyncio.run(scenario())
 
 
-def test_progress_comes_while_work_goes_on_and_the_last_before_the_outcome(new_executor, tmp_path):
+async def progress_comes_while_work_goes_on_and_the_last_before_the_outcome(executor, folder):
+    execution, told = submit(executor, "epochs", {"folder": str(folder), "epochs": 3})
+    for epoch in (1, 2, 3):
+        (folder / str(epoch)).touch()
+        await eventually(lambda epoch=epoch: bool(told) and told[-1].epoch == epoch)
+    (folder / "end").touch()
+    assert isinstance(await execution.outcome(), Returned)
+    assert told == [Progress(epoch / 3, epoch=epoch) for epoch in (1, 2, 3)]
+
+    execution, told = submit(executor, "until_stopped", time_left_s=0.0)
+    await execution.outcome()
+    assert told == []
+    execution, told = submit(executor, "chatter", {"seconds": 0.5})
+    ended = await execution.outcome()
+    assert told[-1].epoch == ended.work.result["reports"]
+    assert told[-1].fraction == 1.0
+
+
+async def work_is_cancelled_wherever_it_is(executor):
+    running_ones = [submit(executor, "until_stopped") for _ in range(2)]
+    waiting, _ = submit(executor, "until_stopped")
+    for _, told in running_ones:
+        await eventually(lambda told=told: bool(told))
+    waiting.cancel()
+    for execution, told in running_ones:
+        execution.cancel()
+        ended = await execution.outcome()
+        assert ended.work.result["cancelled"]
+        assert told[-1].epoch == ended.work.result["best"] > 0
+    assert (await waiting.outcome()).work.result == {"best": 0, "cancelled": True, "time_left": None}
+    # The flag was that work's, not the worker's.
+    soon = await submit(executor, "until_stopped", time_left_s=0.1)[0].outcome()
+    assert not soon.work.result["cancelled"]
+
+
+def test_progress_comes_work_is_cancelled_and_closing_ends_what_runs(new_executor, tmp_path):
+    """In one executor: on a cluster its workers take seconds to start."""
+
     async def scenario():
         async with started(new_executor) as executor:
-            execution, told = submit(executor, "epochs", {"folder": str(tmp_path), "epochs": 3})
-            for epoch in (1, 2, 3):
-                (tmp_path / str(epoch)).touch()
-                await eventually(lambda epoch=epoch: bool(told) and told[-1].epoch == epoch)
-            (tmp_path / "end").touch()
-            assert isinstance(await execution.outcome(), Returned)
-            assert told == [Progress(epoch / 3, epoch=epoch) for epoch in (1, 2, 3)]
-
-            execution, told = submit(executor, "until_stopped", time_left_s=0.0)
-            await execution.outcome()
-            assert told == []
-            execution, told = submit(executor, "chatter", {"seconds": 0.5})
-            ended = await execution.outcome()
-            assert told[-1].epoch == ended.work.result["reports"]
-            assert told[-1].fraction == 1.0
-
-    asyncio.run(scenario())
-
-
-def test_work_is_cancelled_wherever_it_is(new_executor):
-    async def scenario():
-        async with started(new_executor) as executor:
-            running_ones = [submit(executor, "until_stopped") for _ in range(2)]
-            waiting, _ = submit(executor, "until_stopped")
-            for _, told in running_ones:
-                await eventually(lambda told=told: bool(told))
-            waiting.cancel()
-            for execution, told in running_ones:
-                execution.cancel()
-                ended = await execution.outcome()
-                assert ended.work.result["cancelled"]
-                assert told[-1].epoch == ended.work.result["best"] > 0
-            assert (await waiting.outcome()).work.result == {"best": 0, "cancelled": True, "time_left": None}
-            # The flag was that work's, not the worker's.
-            soon = await submit(executor, "until_stopped", time_left_s=0.1)[0].outcome()
-            assert not soon.work.result["cancelled"]
+            await progress_comes_while_work_goes_on_and_the_last_before_the_outcome(executor, tmp_path)
+            await work_is_cancelled_wherever_it_is(executor)
+            deaf, told = submit(executor, "deaf")
+            await eventually(lambda: bool(told))
+        assert isinstance(await deaf.outcome(), Lost)
+        assert executor.ready == 0
 
     asyncio.run(scenario())
 
@@ -205,17 +212,6 @@ def test_a_dead_worker_loses_its_own_work_and_is_replaced(new_executor, tmp_path
             assert executor.restarts == 2
             gate.touch()
             assert isinstance(await bystander.outcome(), Returned)
-
-    asyncio.run(scenario())
-
-
-def test_closing_ends_what_runs(new_executor):
-    async def scenario():
-        async with started(new_executor) as executor:
-            deaf, told = submit(executor, "deaf")
-            await eventually(lambda: bool(told))
-        assert isinstance(await deaf.outcome(), Lost)
-        assert executor.ready == 0
 
     asyncio.run(scenario())
 

@@ -249,11 +249,11 @@ def test_a_restart_of_the_database_loses_nothing(how, tmp_path):
                 gate = asyncio.Event()
 
                 async def client(number):
-                    if number >= 60:
+                    if number >= 40:
                         await gate.wait()
                     return await submit(services[number % 2], number)
 
-                clients = [asyncio.ensure_future(client(number)) for number in range(200)]
+                clients = [asyncio.ensure_future(client(number)) for number in range(100)]
                 await eventually(lambda: len(completions_of(url)) >= 20)
                 gate.set()
                 await asyncio.to_thread(server.restart, how)

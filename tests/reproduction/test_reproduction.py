@@ -14,7 +14,7 @@ from app.reproduction.records import RecordStore
 from app.reproduction.runner import do_runs
 
 SCALE = {
-    "problems": 2,
+    "problems": 1,
     "seeds": 2,
     "epochs": 110,
     "grid_epochs": 8,
@@ -62,7 +62,7 @@ def rewards(records, method, cell="5x10"):
 
 
 def test_every_reward_is_what_the_referee_computes(records):
-    assert len(records) > 40
+    assert len(records) > 20
     for run, record in records.values():
         checked = replay(problem_to_record(problem_of(run.cell, run.problem)), record["assignment"])
         assert record["legal"]
@@ -74,7 +74,7 @@ def test_no_reward_is_above_a_proven_bound(records):
     bounds = {
         (run.cell, run.problem): record["bound"] for run, record in records.values() if run.method == "exact"
     }
-    assert len(bounds) == 4
+    assert len(bounds) == 2
     for run, record in records.values():
         assert record["reward"] <= bounds[run.cell, run.problem] + 1e-9
 
@@ -90,7 +90,7 @@ def test_every_method_has_its_runs(records):
     at_size = {}
     for run, _ in records.values():
         at_size.setdefault((str(run.cell), run.method), []).append(run)
-    assert len(at_size["5x10", "ga"]) == len(at_size["5x10", "transfer-paper"]) == 4
+    assert len(at_size["5x10", "ga"]) == len(at_size["5x10", "transfer-paper"]) == 2
     assert len(at_size["5x10", "qmix-paper"]) == len(at_size["5x10", "transfer-near"]) == 1
     assert ("2x5", "dqn") in at_size
     assert ("5x10", "dqn") not in at_size, "161,051 joint actions"
@@ -117,7 +117,7 @@ def test_a_second_run_writes_the_same_bytes(scale, out, tmp_path):
         if file.is_file() and inside.parts[0] not in TIMED:
             assert (tmp_path / inside).read_bytes() == file.read_bytes(), inside
             compared += 1
-    assert compared > 40
+    assert compared > 30
     assert {p.suffix for p in (out / "figures").iterdir()} == {".svg", ".png"}
 
 

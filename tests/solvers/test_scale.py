@@ -18,7 +18,7 @@ QUICK = {
     "ga": {"num_total": 10, "iteration": 20},
     "local_search": {"moves": 20_000, "restarts": 3},
     "auto": {"moves": 20_000, "restarts": 3},
-    "exact": {"nodes": 30},
+    "exact": {"nodes": 10},
 }
 
 

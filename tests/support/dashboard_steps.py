@@ -7,6 +7,8 @@ import json
 import httpx
 from playwright.sync_api import Page, expect
 
+from app.api.openapi_examples import example_problem
+
 PATIENCE_MS = 60_000
 """Only a failure waits as long; a machine with other work may need a part of it."""
 
@@ -33,6 +35,14 @@ def open_problem(page: Page, problem: dict, name: str = "a test") -> None:
         "async ([problem, name]) => (await import('/dashboard/js/problem.js')).open(problem, name)",
         [problem, name],
     )
+
+
+def begin_again(page: Page) -> Page:
+    """Bring the problem on screen that a new page has, without an answer to it."""
+    ready(page)
+    go(page, "problem")
+    open_problem(page, example_problem("cyclone-idai"), "cyclone-idai")
+    return page
 
 
 def show_answer(page: Page, service_url: str, **asked) -> dict:

@@ -5,6 +5,9 @@ another. It may not where zones lie on its left and on its right, however near t
 is inside their union, or they touch there. A straight piece is free if it may pass the middle of every
 stretch between two borders that it meets, and the points where it meets them. A way may turn at a corner if
 it may pass it so.
+
+Integers are much faster than fractions. So the plane is scaled until all corners are integers, and a point
+inside is `(x, y, w)`, which stands for `(x / w, y / w)`; of a direction only the ratio counts.
 """
 
 import heapq
@@ -23,9 +26,11 @@ class ExactWays:
 
     def __init__(self, zones, measure=math.dist):
         self.measure = measure
-        self.zones = [[exact(corner) for corner in zone] for zone in zones]
+        zones = [[exact(corner) for corner in zone] for zone in zones]
+        self.corners = sorted({corner for zone in zones for corner in zone})
+        self._scale = math.lcm(*(value.denominator for corner in self.corners for value in corner))
+        self.zones = [[self._scaled(corner) for corner in zone] for zone in zones]
         self.edges = [edge for zone in self.zones for edge in zip(zone, zone[1:] + zone[:1], strict=True)]
-        self.corners = sorted({corner for zone in self.zones for corner in zone})
         self._free = {}
 
     def length(self, a, b):
@@ -55,31 +60,41 @@ class ExactWays:
                     onward not in (here, before)
                     and (here, onward) not in done
                     and self.free(here, onward)
-                    and self.may_pass(here, minus(before, here), minus(onward, here))
+                    and self._may_turn(before, here, onward)
                 ):
                     heapq.heappush(heap, (length + self.measure(here, onward), (*points, onward)))
         return math.inf, None
 
     def inside(self, point):
         """Whether a point lies in the interior of the union."""
-        return all(solid for _, _, solid in self._around(point, [(1, 0), (-1, 0), (0, 1)]))
+        return all(solid for _, _, solid in self._around(self._scaled(point), [(1, 0), (-1, 0), (0, 1)]))
 
     def free(self, a, b):
         """Whether the straight way between two different points is free."""
         key = (a, b) if a <= b else (b, a)
         if key not in self._free:
-            self._free[key] = self._is_free(*key)
+            self._free[key] = self._is_free(*map(self._scaled, key))
         return self._free[key]
+
+    def _scaled(self, point):
+        x, y = (value * self._scale for value in point)
+        w = math.lcm(x.denominator, y.denominator)
+        return (int(x * w), int(y * w), w)
 
     def _is_free(self, a, b):
         way = minus(b, a)
-        met = {Fraction(0), Fraction(1)}
+        whole = Fraction(a[2] * b[2])  # how often the way itself goes into its direction
+        met = {Fraction(0), 1 / whole}
         for c, d in self.edges:
-            met.update(t for t in meetings(a, way, c, d) if 0 < t < 1)
+            met.update(t for t in meetings(a, way, c, d) if 0 < t * whole < 1)
         met = sorted(met)
         tried = met[1:-1] + [(s + t) / 2 for s, t in pairwise(met)]
         back = (-way[0], -way[1])
-        return all(self.may_pass((a[0] + t * way[0], a[1] + t * way[1]), back, way) for t in tried)
+        return all(self.may_pass(along(a, t, way), back, way) for t in tried)
+
+    def _may_turn(self, before, here, onward):
+        before, here, onward = map(self._scaled, (before, here, onward))
+        return self.may_pass(here, minus(before, here), minus(onward, here))
 
     def may_pass(self, point, back, ahead):
         """Whether a way from the direction `back` to the direction `ahead` may pass a point."""
@@ -96,14 +111,14 @@ class ExactWays:
 
     def _around(self, point, directions):
         """Sectors around a point between directions and borders: from, to, and whether they are solid."""
-        directions = list(directions)
-        for c, d in self.edges:
-            if on(point, c, d):
-                directions += [minus(end, point) for end in (c, d) if end != point]
+        borders = [minus(end, point) for c, d in self.edges if on(point, c, d) for end in (c, d)]
+        directions = [*directions, *(border for border in borders if border != (0, 0))]
         distinct = []
         for direction in sorted(directions, key=Angle):
             if not distinct or not same(distinct[-1], direction):
                 distinct.append(direction)
+        # Where no border is, all around the point is as the point is.
+        everywhere = None if borders else self._in_a_zone(point)
         sectors = []
         for left, right in zip(distinct, distinct[1:] + distinct[:1], strict=True):
             between = (left[0] + right[0], left[1] + right[1])
@@ -111,15 +126,17 @@ class ExactWays:
                 between = (-between[0], -between[1])
             elif turn(left, right) == 0:
                 between = (-left[1], left[0])
-            sectors.append((left, right, self._solid(point, between)))
+            solid = self._solid(point, between) if everywhere is None else everywhere
+            sectors.append((left, right, solid))
         return sectors
 
     def _solid(self, point, direction):
         """Whether points in a direction, which is that of no border, are inside a zone however near."""
         ahead = [t for c, d in self.edges for t in meetings(point, direction, c, d) if t > 0]
-        t = min(ahead, default=Fraction(1)) / 2
-        near = (point[0] + t * direction[0], point[1] + t * direction[1])
-        return any(odd(near, zone) for zone in self.zones)
+        return self._in_a_zone(along(point, min(ahead, default=Fraction(1)) / 2, direction))
+
+    def _in_a_zone(self, point):
+        return any(odd(point, zone) for zone in self.zones)
 
 
 class Angle:
@@ -141,7 +158,14 @@ def exact(point) -> Point:
 
 
 def minus(a, b):
-    return (a[0] - b[0], a[1] - b[1])
+    """The direction from a point to another: their difference times both of their `w`."""
+    return (a[0] * b[2] - b[0] * a[2], a[1] * b[2] - b[1] * a[2])
+
+
+def along(a, t, way):
+    """The point that lies `t` times a direction away."""
+    p, q = t.numerator, t.denominator
+    return (a[0] * q + p * way[0] * a[2], a[1] * q + p * way[1] * a[2], a[2] * q)
 
 
 def turn(a, b):
@@ -164,17 +188,23 @@ def on(point, c, d):
 def meetings(a, way, c, d):
     """How far along a line, in lengths of `way`, it meets a side: once, at both ends of it, or never."""
     side, gap = minus(d, c), minus(c, a)
-    across = turn(way, side)
+    across, beside = turn(way, side), turn(gap, way)
     if across == 0:
-        return [dot(minus(end, a), way) / dot(way, way) for end in (c, d)] if turn(gap, way) == 0 else []
-    return [turn(gap, side) / across] if 0 <= turn(gap, way) / across <= 1 else []
+        if beside != 0:
+            return []
+        return [Fraction(dot(minus(end, a), way), dot(way, way) * a[2]) for end in (c, d)]
+    if across < 0:
+        across, beside, side = -across, -beside, (-side[0], -side[1])
+    # The side's ends are integers, so that only the `w` of the point is in the gap.
+    return [Fraction(turn(gap, side), across * a[2])] if 0 <= beside <= across * a[2] else []
 
 
 def odd(point, zone):
     """Whether a point, not on the border, is inside a zone: a line from it crosses an odd number of sides."""
-    x, y = point
+    x, y, w = point
     inside = False
-    for (ax, ay), (bx, by) in zip(zone, zone[1:] + zone[:1], strict=True):
-        if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
-            inside = not inside
+    for (ax, ay, _), (bx, by, _) in zip(zone, zone[1:] + zone[:1], strict=True):
+        if (ay * w > y) != (by * w > y):
+            left = (x - ax * w) * (by - ay) < (y - ay * w) * (bx - ax)
+            inside ^= left == (by > ay)
     return inside
