@@ -248,6 +248,24 @@ def test_a_slow_service_is_shown_of_the_newest_moment_only(page, service):
     assert value(row.locator("td.n").first) == pytest.approx(uav["voyage"] - uav["dis"])
 
 
+def test_another_problem_while_the_service_is_asked_ends_the_mission(page, service):
+    ready(page)
+    page.expected_troubles.append("ERR_FAILED")
+    show_answer(page, service.url, algorithm="greedy")
+    go(page, "field")
+    expect(page.locator("[data-testid=field-uavs] tbody tr").first).to_be_visible()
+    held = []
+    page.route("**/evaluate", lambda route: held.append(route))  # noqa: PLW0108 - it takes no built-in
+    with page.expect_request("**/evaluate"):
+        page.locator("#field-time").fill("0.1")
+        page.locator("#field-time").press("Tab")
+    open_problem(page, state(page, "problem"))
+    with page.expect_event("requestfailed"):
+        held[0].abort()
+    # What the page makes of that it has made by now; trouble is told at the end of these tests.
+    expect(page.locator("[data-testid=field-uavs]")).to_be_hidden()
+
+
 MEASURE = """
     const { changes, withNeeds } = await load("mid_mission.js");
     const { met } = await load("plan.js");

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import Flags, ProblemArrays, compile_problem
+from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.evaluation import replay_at_best
 from app.simulation.planned_amounts import amounts_are_exact, best_amounts, how_many
 from app.simulation.visit import ALLOWED
@@ -177,7 +177,7 @@ def without_useless(arrays: ProblemArrays, actions: Actions) -> Actions:
     while True:
         amounts = best_amounts(arrays, actions)
         useless = (actions < home) & ~(amounts.delivered > 0).any(axis=2)
-        leaves: Flags = (amounts.loaded < 0).any(axis=2)
+        leaves = np.asarray((amounts.loaded < 0).any(axis=2))
         shorter = np.full_like(actions, home)
         for i in range(actions.shape[1]):
             kept = np.flatnonzero((actions[:, i] != home) & ~useless[:, i])

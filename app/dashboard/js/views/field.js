@@ -126,6 +126,9 @@ function plan() {
   return known;
 }
 
+/** Whether a plan is still on screen; there may be none by now. */
+const isOnScreen = ({ answer, problem }) => get().answer === answer && get().answerProblem === problem;
+
 /** Where the clock is: a plan may begin later than at 0. */
 function clock() {
   return Math.max(plan().course.begin, get().mission.clock);
@@ -193,7 +196,7 @@ async function moment() {
   while (get().answer && !upToDate()) {
     asking ??= ask().finally(() => { asking = null; });
     const { found, of, mission } = await asking;
-    if (!found && of === plan() && mission === get().mission) return null;
+    if (!found && isOnScreen(of) && mission === get().mission) return null;
   }
   return get().answer && known.moment;
 }
