@@ -143,7 +143,6 @@ def improve_together(
     if left < math.inf:
         possible = left * moves_a_second(searches[0].arrays)
         rounds = rounds_for(rounds, possible / max(moves, 1))
-        cooling = _as_hot_as_pays(cooling, possible / rounds, int(searches[0].routes.length.sum()))
     combination = Combination(searches, rounds, left)
     searches = combination.searches
     first = searches[0]
@@ -177,15 +176,6 @@ def improve_together(
     drop_idle_reloads(first)
 
 
-def _as_hot_as_pays(cooling: Cooling, moves: float, stops: int) -> Cooling:
-    """Begin colder where a round has few moves for each stop: heat that there is no time to undo only costs.
-
-    Measured on 20x60 to 300x600 and on problems with bases up to 100x1,000 (``tests/benchmarks/LOG.md``).
-    """
-    heat = min(1.0, moves / (_PATIENT_MOVES_A_STOP * max(stops, 1)))
-    return cooling._replace(hot=cooling.cold * (cooling.hot / cooling.cold) ** heat)
-
-
 def _round(
     search: Search,
     rng: np.random.Generator,
@@ -203,24 +193,38 @@ def _round(
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
         haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
-    ratio = cooling.cold / cooling.hot * (scale / largest)
     done, share, told = 0, span.share(0), 0.0
     step = piece / span.moves
+    stops, expected = int(search.routes.length.sum()), float(span.moves)
+    if span.end < np.inf:
+        expected = min(expected, moves_a_second(search.arrays) * (span.end - span.begin))
     while done < span.moves and share < 1.0 and not stop():
         count = min(piece, span.moves - done)
-        hot, cold = (cooling.hot * ratio**part * largest for part in (share, min(share + step, 1.0)))
+        begin = cooling.hot if span.end == np.inf else _begin(cooling, expected, stops)
+        ratio = cooling.cold / begin * (scale / largest)
+        hot, cold = (begin * ratio**part * largest for part in (share, min(share + step, 1.0)))
         anneal(
             search, rng, count, hot, cold, cooling.penalty * scale, haste, thrift,
             share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav),
         )  # fmt: skip
         done += count
         now = span.share(done)
+        expected = done / max(now, 1e-9)
         # The next piece is expected to bring it as far as this one did.
         share, step = now, max(now - share, count / span.moves)
         if share - told >= 1.0 / _TOLD:
             told = share
             tell(min(share, 1.0))
     drop_useless(search)
+
+
+def _begin(cooling: Cooling, moves: float, stops: int) -> float:
+    """Return the temperature that a round begins with: colder where it has few moves for each stop.
+
+    Heat that there is no time to undo only costs (``tests/benchmarks/LOG.md``).
+    """
+    heat = min(1.0, moves / (_PATIENT_MOVES_A_STOP * max(stops, 1)))
+    return cooling.cold * (cooling.hot / cooling.cold) ** heat
 
 
 def _share_best(searches: Sequence[Search]) -> None:
