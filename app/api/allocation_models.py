@@ -116,7 +116,7 @@ class ReloadModel(AnswerModel):
     step: int = Field(description="Decision step, from 1")
     arrival_time: float = Field(description="Time units from now, or h")
     distance: float = Field(description="Length of the leg flown to it")
-    loaded: list[float] = Field(description="Amounts taken up, one a material")
+    loaded: list[float] = Field(description="Amounts taken up, one a material; below 0: left behind")
     departure_time: float = Field(description="When it may take off again")
     path: list[tuple[float, float]] | None = Field(description=f"{_PATH} to it")
 

@@ -102,6 +102,22 @@ ALLOCATION_EXAMPLES: dict[str, Example] = {
             "bound": True,
         },
     ),
+    "planned-loading": Example(
+        summary="Empty UAVs at a base: what each flight carries, by weight, is decided with the plan",
+        value={
+            **_SMALL_TASK,
+            "uavs": [
+                {"x_s": 0.5, "y_s": 0.5, "speed": 1.0, "voyage": 2.0, "loadlist": [0, 0], "capacity": 4.0},
+                {"x_s": 0.5, "y_s": 0.5, "speed": 1.2, "voyage": 2.0, "loadlist": [0, 0], "capacity": 3.0},
+            ],
+            "bases": [{"x": 0.5, "y": 0.5, "stock": [20, 30], "turnaround": 0.1}],
+            "materials": [{"name": "water", "weight": 1.0}, {"name": "medicine", "weight": 0.25}],
+            "max_steps": 8,
+            "objective": {"unloading": "planned", "loading": "planned", "distance_weight": 0.2},
+            "algorithm": "auto",
+            "time_limit_s": 1,
+        },
+    ),
     "mid-mission": Example(summary="A swarm that is on its way already", value=_mid_mission()),
     **{
         algorithm.name: Example(summary=algorithm.summary, value=_allocation_example(algorithm.name))

@@ -99,8 +99,7 @@ class UAV:
     full_load: Annotated[
         tuple[float, ...] | None,
         Amounts(same_as="loadlist"),
-        "Amounts that it leaves a base with, one a material, as far as they are in stock; default: its "
-        "`loadlist`",
+        "Amounts that it leaves a base with, as far as they are in stock; default: its `loadlist`",
     ] = field(default=None, kw_only=True)
     capacity: Annotated[
         float | None,
@@ -142,11 +141,9 @@ class UAV:
     @property
     def begins_on_ground(self) -> bool:
         """Whether its flight begins at its starting point: then it waits there for its first visit."""
-        at_start = (self.x_c, self.y_c) == (self.x_s, self.y_s) and self.home_location in (
-            None,
-            self.location,
-        )
-        return at_start and self.dis == 0.0 and self.airborne == 0.0
+        there = (self.x_c, self.y_c) == (self.x_s, self.y_s)
+        there = there and self.home_location in (None, self.location)
+        return there and self.dis == 0.0 and self.airborne == 0.0
 
     @property
     def full(self) -> tuple[float, ...]:
@@ -218,14 +215,9 @@ class Target:
 
     def broken_rules(self) -> Iterator[tuple[str, str]]:
         """Yield the amounts of ``requested`` that are less than what is still needed."""
-        if self.requested is None:
-            return
-        for k, (asked, needed) in enumerate(zip(self.requested, self.loadlist, strict=False)):
+        for k, (asked, needed) in enumerate(zip(self.requested or (), self.loadlist, strict=False)):
             if asked < needed * (1.0 - ROUNDING):
-                yield (
-                    f"/requested/{k}",
-                    f"{written(asked)} is less than the {written(needed)} still needed",
-                )
+                yield f"/requested/{k}", f"{written(asked)} is less than the {written(needed)} still needed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,13 @@ def explain(
         distance_weight=problem.distance_weight,
         routes=tuple(routes),
         unmet=unmet_targets(
-            problem, arrays, actions, Amounts(trace.delivered, trace.loaded), episodes.need[0], hurry
+            problem,
+            arrays,
+            actions,
+            Amounts(trace.delivered, trace.loaded),
+            episodes.need[0],
+            hurry,
+            keep=amounts is not None or bool(problem.bases),
         ),
     )
     if not world:

@@ -57,6 +57,8 @@ def unmet_targets(
     amounts: Amounts,
     needs: Floats,
     hurry: Callable[[], bool],
+    *,
+    keep: bool,
 ) -> tuple[Unmet, ...]:
     """List the targets with needs left at the end of a plan.
 
@@ -70,6 +72,8 @@ def unmet_targets(
         (N, K) what is still needed at the end, as it is to be printed.
     hurry
         Once it is true, nothing more is looked at.
+    keep
+        Whether planned amounts stay as they are whatever is added; otherwise they are worked out anew.
     """
     planned = problem.plans_unloading
     plan = record_plan(arrays, actions, amounts, planned)
@@ -81,7 +85,7 @@ def unmet_targets(
     start = look_from_start(arrays, plan, open_targets)
     lookout: Lookout | SpareLookout
     counterfactuals: Counterfactuals | SpareLookout
-    if planned and problem.bases:
+    if planned and keep:
         lookout = counterfactuals = SpareLookout(arrays, plan, actions, amounts, hurry)
     else:
         scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None

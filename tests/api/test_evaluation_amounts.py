@@ -90,3 +90,13 @@ def test_amounts_that_do_not_fit_are_refused_by_name(client, changes, pointer, s
     assert answer.status_code == 422
     error = next(each for each in answer.json()["errors"] if each["pointer"] == pointer)
     assert says in error["detail"]
+
+
+def test_reasons_keep_amounts_that_are_given(client):
+    uav = {"id": "u1", "x_s": 0, "y_s": 0, "speed": 1, "voyage": 10, "loadlist": [4]}
+    target = {"id": "north", "x": 0, "y": 1, "level": 2, "loadlist": [4]}
+    body = {"uavs": [uav], "targets": [target], "objective": {"distance_weight": 0.1, "unloading": "planned"}}
+    answer = client.post("/evaluate", json={**body, "assignment": [[0]], "delivered": [[[1]]]}).json()
+    (reason,) = answer["unmet"]
+    assert (reason["remaining"], reason["code"], reason["uav_id"]) == ([3.0], "not_chosen", "u1")
+    assert reason["reward_change"] == pytest.approx(2 * 3 / 4)

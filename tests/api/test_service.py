@@ -108,7 +108,8 @@ def test_description_has_an_example_for_each_algorithm(client):
     def examples(path):
         return description["paths"][path]["post"]["requestBody"]["content"]["application/json"]["examples"]
 
-    others = {"cyclone-idai", "cyclone-freddy", "rwanda-floods", "planned-unloading", "mid-mission"}
+    others = {"cyclone-idai", "cyclone-freddy", "rwanda-floods", "planned-unloading"}
+    others |= {"planned-loading", "mid-mission"}
     assert set(examples("/allocate")) == algorithms | others
     assert set(examples("/allocate")) == set(ALLOCATION_EXAMPLES)
     assert set(examples("/library")) == {"checkpoint", "train", "job_id"} == set(REGISTRATION_EXAMPLES)

@@ -18,7 +18,6 @@ from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import ExactParameters, LocalSearchParameters
 from app.solvers.protocol import SolverContext
-from app.solvers.registry import create_solver
 from app.solvers.stop import Deadline, never
 
 
@@ -85,14 +84,6 @@ def test_a_time_limit_takes_no_proof_away(family, m, n, threads):
     stop = Deadline(6.0, time.process_time)
     exact = Exact(ExactParameters(), SolverContext(threads=threads))
     assert exact.solve(problem, 1, stop, lambda _told: None).proof.proven
-
-
-def test_nor_does_planned_unloading():
-    problem = generate("uniform", 5, 5, 3, np.random.default_rng(4))
-    problem = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    solver = create_solver("exact", ExactParameters(), SolverContext())
-    stop = Deadline(6.0, time.process_time)
-    assert solver.solve(problem, 1, stop, lambda _told: None).proof.proven
 
 
 def test_it_can_be_stopped_anywhere():

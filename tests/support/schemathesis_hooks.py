@@ -74,10 +74,34 @@ def breaks_rules(problem):
     return problem.get("crs") == "wgs84" and any(abs(x) > 180 or abs(y) > 90 for x, y in points)
 
 
+def has_amounts_that_misfit(body):
+    """Say whether an evaluation brings amounts that are not planned, or not of its plan's shape."""
+    objective, m, k = body.get("objective") or {}, len(body["uavs"]), len(body["uavs"][0]["loadlist"])
+    planned = {"delivered": objective.get("unloading") == "planned"}
+    planned["loaded"] = objective.get("loading") == "planned" and bool(body.get("bases"))
+    given = {name for name in planned if body.get(name) is not None}
+    if any(not planned[name] for name in given) or (given and all(planned.values()) and len(given) < 2):
+        return True
+    for name in given:
+        rows = body[name]
+        if len(rows) != len(body["assignment"]) or any(len(row) != m for row in rows):
+            return True
+        stops = [each for row in rows for each in row if each is not None]
+        if any(len(each) != k or (name == "delivered" and min(each, default=0) < 0) for each in stops):
+            return True
+    return False
+
+
 def is_illegal(problem, plan):
-    """Say whether a plan breaks a rule of a problem."""
+    """Say whether a plan breaks a rule of a problem, with the amounts that it brings."""
+    nothing = [0.0] * len(problem["uavs"][0]["loadlist"])
+    amounts = {
+        name: [[each or nothing for each in row] for row in problem[name]]
+        for name in ("delivered", "loaded")
+        if problem.get(name) is not None
+    }
     try:
-        replay(problem, plan)
+        replay(problem, plan, **amounts)
     except Illegal:
         return True
     return False
@@ -121,7 +145,8 @@ def breaks_rule_beyond_schemas(case, kind):
         rows = body.get("assignment", ()) if case.path == "/evaluate" else ()
         uneven = any(len(row) != len(body["uavs"]) for row in rows)
         beyond = asked is not None and problem is not None and is_beyond_observation(problem, asked, default)
-        return uneven or beyond or (problem is not None and breaks_rules(problem))
+        misfit = case.path == "/evaluate" and has_amounts_that_misfit(body)
+        return uneven or misfit or beyond or (problem is not None and breaks_rules(problem))
     if kind == "illegal-plan":
         return is_illegal(body, body["assignment"] if case.path == "/evaluate" else body["start_plan"])
     if kind == "invalid-parameters":

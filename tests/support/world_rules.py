@@ -97,6 +97,8 @@ def promises(problem):
 
 def exclusions(problem):
     objective = problem.get("objective") or {}
+    if objective.get("loading") == "planned" and objective.get("unloading") != "planned":
+        return True
     if objective.get("half_life") is not None and objective.get("unloading") == "planned":
         return True
     if objective.get("change_weight", 0) > 0 and problem.get("start_plan") is None:
