@@ -24,7 +24,7 @@ from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
 sys.path.append(str(Path(__file__).parents[2]))
 
 from referee import Illegal, replay
-from world_rules import breaks_rules_of_the_world, has_too_many_corners
+from world_rules import breaks_rules_of_the_world, has_too_many_parts
 
 from app.domain.errors import InvalidParameters
 from app.domain.identifiers import fault_of
@@ -153,7 +153,7 @@ def breaks_rule_beyond_schemas(case, kind):
         return asked is not None and has_wrong_parameters(asked, default)
     if kind == "problem-too-large":
         limited = asked is not None and asked.get("algorithm", default) in LIMITED_BY_SIZE
-        return limited or (problem is not None and has_too_many_corners(problem))
+        return limited or (problem is not None and has_too_many_parts(problem))
     if kind == "invalid-checkpoint":
         return "checkpoint" in body and is_no_checkpoint(body["checkpoint"])
     if kind == "idempotency-key-reused":

@@ -13,6 +13,9 @@ from app.domain.identifiers import fault_of
 MOST_CORNERS = 1000
 """The default of the setting."""
 
+MOST_MATERIALS = 8
+"""What the service of the tests of the API takes (``tests/api/conftest.py``)."""
+
 DOUBTFUL = 1e-6
 """Sizes of a polygon below which a crossing may be only a touch."""
 
@@ -170,8 +173,10 @@ def zones(problem):
     return any(is_none([on_sphere(*corner) for corner in polygon]) for polygon in polygons)
 
 
-def has_too_many_corners(problem):
-    """Whether all zones together have more corners than are taken."""
+def has_too_many_parts(problem):
+    """Whether there are more materials, or corners of all zones together, than the tests' service takes."""
+    if len(problem.get("materials") or ()) > MOST_MATERIALS:
+        return True
     return sum(len(zone["polygon"]) for zone in problem.get("no_fly_zones") or []) > MOST_CORNERS
 
 
