@@ -8,6 +8,8 @@ one transportation problem, they are found by flows (:mod:`app.simulation.delive
 from __future__ import annotations
 
 from collections import deque
+from operator import is_
+from typing import Any
 
 import numpy as np
 
@@ -46,17 +48,19 @@ def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
         return by_flow
     if how_many(arrays, actions) > _LARGEST_PROGRAM or _is_flow(arrays, by_flow):
         return in_turn(arrays, actions, by_flow)
-    key = actions.shape, actions.tobytes()
-    for need, known, amounts in tuple(_solved):
-        if need is arrays.need and known == key:
+    limits = arrays.need, arrays.stock, arrays.load, arrays.uavs
+    plan = actions.shape, actions.tobytes()
+    for known_limits, known_plan, amounts in tuple(_solved):
+        if plan == known_plan and all(map(is_, limits, known_limits)):
             return amounts
     amounts = amounts_by_program(arrays, actions)
-    _solved.append((arrays.need, key, amounts))
+    _solved.append((limits, plan, amounts))
     return amounts
 
 
-_solved: deque[tuple[Floats, tuple[tuple[int, ...], bytes], Amounts]] = deque(maxlen=4)
-"""The newest programs, by problem and plan: search, answer and explanation ask for the same one."""
+_Solved = tuple[tuple[Any, ...], tuple[tuple[int, ...], bytes], Amounts]
+_solved: deque[_Solved] = deque(maxlen=4)
+"""The newest programs, by what limits amounts, and the plan: search, answer and reasons ask for the same."""
 
 
 def amounts_are_exact(arrays: ProblemArrays) -> bool:

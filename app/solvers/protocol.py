@@ -141,7 +141,7 @@ class Proof:
     Attributes
     ----------
     bound
-        No plan that unloads greedily earns more.
+        No plan earns more that unloads as the algorithm's do: greedily, or with planned amounts.
     proven
         Whether the plan reaches it, so that it is the best there is.
     """
@@ -167,7 +167,7 @@ class Solution:
     checkpoint
         What was learned, as a checkpoint of :mod:`app.learning.checkpoints.checkpoint`, or None.
     proof
-        How good the plan is, if the algorithm knows; of plans that unload greedily.
+        How good the plan is, if the algorithm knows.
     answered_by
         The algorithm whose plan it is, by its name in the registry, where it is not this one's; else None.
     """

@@ -118,6 +118,14 @@ def test_what_is_aboard_may_stay_behind_for_another():
     assert not best_amounts(compile_problem(replace(problem, uavs=uavs[::-1])), actions[:, ::-1]).loaded.any()
 
 
+def test_what_is_known_of_a_plan_is_not_taken_for_another_stock():
+    arrays, actions = compile_problem(village()), np.array([[3], [0], [3], [1]])
+    assert best_amounts(arrays, actions).loaded[:, 0, 0].tolist() == [3.0, 0.0, 3.0, 0.0]
+    less = arrays._replace(stock=arrays.stock * [0.5, 1.0])
+    assert best_amounts(less, actions).loaded[:, 0, 0].sum() == 3.0
+    assert best_amounts(arrays, actions).loaded[:, 0, 0].tolist() == [3.0, 0.0, 3.0, 0.0]
+
+
 def test_a_visit_that_gets_nothing_is_not_legal():
     problem = village(bases=(Base("base-1", 0, 0, stock=(0.0, 4.0)),))
     arrays = compile_problem(problem)
