@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.simulation.arrays import ProblemArrays
+from app.simulation.arrays import Floats, ProblemArrays
 
 _NOTHING = 1e-300
 """Level that is none: beside it other numbers would leave the range of floating-point numbers."""
@@ -22,9 +22,12 @@ def common_level(arrays: ProblemArrays) -> float:
     levels = arrays.areas["level"][0][
         (arrays.areas["need_total"][0] > 0) & (arrays.areas["level"][0] > _NOTHING)
     ]
-    if not len(levels):
-        return largest_level(arrays)
-    return min(largest_level(arrays), _TYPICAL * float(np.exp(np.log(levels).mean())))
+    return common_of(levels) if len(levels) else largest_level(arrays)
+
+
+def common_of(values: Floats) -> float:
+    """Return the largest of some values, all above 0, that does not stand out from the others."""
+    return float(min(values.max(), _TYPICAL * np.exp(np.log(values).mean())))
 
 
 def largest_level(arrays: ProblemArrays) -> float:

@@ -18,12 +18,18 @@ from app.simulation.evaluation import reward_of, rewards_of
 from app.simulation.generator import generate
 from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
-from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
+from app.solvers.local_search.annealing import (
+    actions_of,
+    anneal,
+    draw_change,
+    drop_useless,
+    new_search,
+    set_routes,
+)
 from app.solvers.local_search.ceiling import most_satisfaction
-from app.solvers.local_search.change import apply, extra_closing, extra_distance, feasible, undo
+from app.solvers.local_search.change import apply, extra_closing, extra_distance, undo
 from app.solvers.local_search.effort import default_moves, default_restarts
 from app.solvers.local_search.improvement import Cooling, improve
-from app.solvers.local_search.moves import draw_move
 from app.solvers.local_search.routes import SATISFACTION, USELESS
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
@@ -79,9 +85,7 @@ def test_totals_stay_those_of_the_simulator_through_random_moves():
         set_routes(search, greedy_plan(problem).as_array())
         assert_evaluated(search)
         for _ in range(60):
-            if not draw_move(search.arrays, search.routes, search.near, search.change, rng):
-                continue
-            if not feasible(search.arrays, search.change):
+            if not draw_change(search, rng, large=0.5):
                 continue
             extra = extra_distance(search.arrays, search.routes, search.change)
             closing = extra_closing(search.arrays, search.routes, search.change)
@@ -102,9 +106,7 @@ def test_undoing_leaves_no_trace():
         for _ in range(40):
             before = [each.copy() for each in search.routes]
             lengths = search.routes.length.copy()
-            if not draw_move(search.arrays, search.routes, search.near, search.change, rng):
-                continue
-            if not feasible(search.arrays, search.change):
+            if not draw_change(search, rng, large=0.5):
                 continue
             apply(
                 search.arrays,
@@ -132,7 +134,7 @@ def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
         scale = max(float(search.arrays.areas["level"].max()), 1e-9)
-        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, 0.0, 0.0, False)
+        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, large=0.3)
         assert_evaluated(search)
         assert search.routes.total[SATISFACTION] <= search.most
         drop_useless(search)
@@ -259,7 +261,7 @@ def test_what_was_used_comes_back():
     used = solve(problem).parameters
     assert (used.moves, used.restarts) == (
         default_moves(arrays),
-        default_restarts(arrays, default_moves(arrays), visits=1),
+        default_restarts(arrays, default_moves(arrays), np.zeros(len(arrays.uavs[0]), np.int64)),
     )
     assert solve(problem, moves=0).history.epoch[0] == 0
     given = LocalSearchParameters(moves=300, restarts=4)

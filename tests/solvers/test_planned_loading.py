@@ -130,7 +130,7 @@ def test_the_search_keeps_count_of_what_its_plan_earns():
         near = search.search.near
         if not len(near.active) or not len(near.wanted) or new_episodes(arrays, 1).done[0]:
             continue
-        anneal_planned(search, rng, 1.0, 0.1, 500, 1e9)
+        anneal_planned(search, rng, 1.0, 0.1, 500, 1e9, 0.3)
         routes = search.search.routes
         now = np.full((problem.max_steps, problem.n_uavs), problem.n_targets)
         for i, length in enumerate(routes.length):

@@ -119,7 +119,7 @@ def test_the_search_keeps_count_of_what_its_plan_earns():
         search = new_planned_search(arrays, Plan.empty(problem.n_uavs, problem.n_targets).as_array())
         if not len(search.search.near.active) or not len(search.search.near.wanted):
             continue
-        anneal_planned(search, rng, 1.0, 0.1, 500, 1e9)
+        anneal_planned(search, rng, 1.0, 0.1, 500, 1e9, 0.3)
         best = np.full((problem.max_steps, problem.n_uavs), problem.n_targets)
         for i, length in enumerate(search.search.best_length):
             best[:length, i] = search.search.best_target[i, :length]

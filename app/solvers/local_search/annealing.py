@@ -25,6 +25,7 @@ from app.solvers.local_search.change import (
 from app.solvers.local_search.flights import is_reload
 from app.solvers.local_search.moves import draw_move
 from app.solvers.local_search.neighbourhood import Neighbourhood, neighbourhood
+from app.solvers.local_search.rebuild import Rebuilding, new_rebuilding, rebuild
 from app.solvers.local_search.routes import (
     CLOSING,
     DISTANCE,
@@ -67,6 +68,7 @@ class Search(NamedTuple):
     best: Floats
     most: float
     pool: Pool
+    rebuilding: Rebuilding
 
 
 def new_search(arrays: ProblemArrays) -> Search:
@@ -88,7 +90,16 @@ def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float, pool: Pool) 
         routes.total[DISTANCE] = at_home.sum()
     best = np.array([-arrays.terms["weight"][0] * routes.total[DISTANCE] - routes.total[CLOSING]])
     return Search(
-        arrays, near, routes, new_change(arrays), routes.target.copy(), routes.length.copy(), best, most, pool
+        arrays,
+        near,
+        routes,
+        new_change(arrays),
+        routes.target.copy(),
+        routes.length.copy(),
+        best,
+        most,
+        pool,
+        new_rebuilding(arrays),
     )
 
 
@@ -237,10 +248,19 @@ def _drop_idle_reloads(search: Search) -> None:
                 undo(arrays, routes, change)
 
 
+@compiled
+def draw_change(search: Search, rng: np.random.Generator, large: float) -> bool:
+    """Propose a random change that rule 2 allows, of a large move with a probability; False where none is."""
+    arrays, routes, near, change = search.arrays, search.routes, search.near, search.change
+    if large > 0.0 and rng.random() < large:
+        return rebuild(arrays, routes, near, change, search.rebuilding, rng)
+    return draw_move(arrays, routes, near, change, rng) and feasible(arrays, change)
+
+
 @compiled_nogil
 def anneal(
     search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float,
-    haste: float = 0.0, thrift: float = 0.0, collecting: bool = False,
+    haste: float = 0.0, thrift: float = 0.0, collecting: bool = False, large: float = 0.0,
 ) -> int:  # fmt: skip
     """Try moves while the temperature falls geometrically from `hot` to `cold`; return how many were kept.
 
@@ -261,6 +281,8 @@ def anneal(
         the routes is worth something before anything is put into it.
     collecting
         Whether the routes that a kept change makes go to the search's pool.
+    large
+        Probability of a large move.
     """
     arrays, routes, change, pool = search.arrays, search.routes, search.change, search.pool
     weight = arrays.terms[0].weight
@@ -270,7 +292,7 @@ def anneal(
     cooling = math.exp(math.log(cold / hot) / max(moves, 1))
     for _ in range(moves):
         temperature *= cooling
-        if not draw_move(arrays, routes, search.near, change, rng) or not feasible(arrays, change):
+        if not draw_change(search, rng, large):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
         price = (weight + thrift) * extra + haste * extra_time(routes, change) + closing

@@ -11,10 +11,10 @@ import numpy as np
 from app.simulation.arrays import Integers
 from app.solvers.column_generation.diving import dive
 from app.solvers.column_generation.packing import Packing, Relaxation, next_reward
-from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool, often_whole, pour, thin
+from app.solvers.column_generation.pool import CAPACITY, always_whole, new_pool, pour, thin
 from app.solvers.column_generation.pricing import Pricing
 from app.solvers.local_search.annealing import Search, drop_useless, set_routes
-from app.solvers.local_search.effort import combined_round
+from app.solvers.local_search.effort import combined_round, is_combined
 from app.solvers.protocol import StopCriterion
 from app.solvers.stop import Deadline, EarlierOf
 
@@ -51,7 +51,7 @@ class Combination:
         """Prepare to combine the routes of several rounds, in a part of the seconds left."""
         arrays = searches[0].arrays
         time_enough = left >= _WORTH_S
-        self._on = rounds > 1 and time_enough and often_whole(arrays)
+        self._on = rounds > 1 and time_enough and is_combined(arrays, searches[0].routes.length)
         self._left, self._unlimited = left, math.isinf(left)
         self._begin, self._spent = time.monotonic(), 0.0
         self.seconds = 0.0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from app.simulation.arrays import ProblemArrays
+import numpy as np
+
+from app.simulation.arrays import Integers, ProblemArrays
 from app.solvers.column_generation.pool import often_whole
 
 _MOVES_A_VISIT = 40_000
@@ -14,12 +16,21 @@ _ROUND_A_VISIT = 5_000
 _COMBINED_ROUND = 90
 """Moves of a round for each pair of visits of a plan, where the routes of all rounds are combined."""
 
+_LONGEST_COMBINED = 10.0
+"""Mean visits of a route up to which routes are combined."""
+
 _LEAST_VISITS = 30
 """Visits, at least, by which such a round is measured."""
 
 _MOST = 4_300_000
 """Bound of the moves times what one costs; about 2 s."""
 
+
+_LARGE_SHARE = 0.5
+"""Share of the time that goes to large moves (``tests/benchmarks/LOG.md``)."""
+
+_LARGE_COST, _LARGE_COST_A_STOP = 3.0, 0.6
+"""What a large move costs, in small ones, and for each stop of a route."""
 
 _SPEED = 3e6
 """Moves a second times what one costs, on a core of 2024."""
@@ -31,6 +42,19 @@ _PATIENCE = 25
 def move_cost(arrays: ProblemArrays) -> float:
     """Cost of a move, 1 at least: it grows with materials and with the length of routes, not with M or N."""
     return 1.0 + arrays.shape[2] / 16 + int(arrays.max_steps[0]) / 20
+
+
+def large_moves(lengths: Integers) -> tuple[float, float]:
+    """Return how probable a large move is, and how many small ones a move costs then in the mean.
+
+    Parameters
+    ----------
+    lengths
+        (M,) stops of the routes: a large move looks at all of one or two.
+    """
+    cost = _LARGE_COST + _LARGE_COST_A_STOP * _mean_stops(lengths)
+    probability = _LARGE_SHARE / (_LARGE_SHARE + (1.0 - _LARGE_SHARE) * cost)
+    return probability, 1.0 + probability * (cost - 1.0)
 
 
 def moves_a_second(arrays: ProblemArrays) -> float:
@@ -48,10 +72,19 @@ def default_moves(arrays: ProblemArrays) -> int:
     return round(min(_MOVES_A_VISIT * _visits(arrays), _MOST / move_cost(arrays)))
 
 
-def default_restarts(arrays: ProblemArrays, moves: int, visits: int) -> int:
-    """Return in how many rounds more than one the moves are made, from a plan with so many visits."""
-    a_round = combined_round(visits) if often_whole(arrays) else _ROUND_A_VISIT * _visits(arrays)
+def default_restarts(arrays: ProblemArrays, moves: int, lengths: Integers) -> int:
+    """Return in how many rounds more than one the moves are made, from a plan with routes (M,) so long."""
+    combined = is_combined(arrays, lengths)
+    a_round = combined_round(int(lengths.sum())) if combined else _ROUND_A_VISIT * _visits(arrays)
     return max(0, moves // a_round - 1)
+
+
+def is_combined(arrays: ProblemArrays, lengths: Integers) -> bool:
+    """Whether the routes of several rounds are combined, where plans have routes (M,) so long.
+
+    Where UAVs carry enough for what they visit, and few sets of areas are a route.
+    """
+    return often_whole(arrays) and _mean_stops(lengths) <= _LONGEST_COMBINED
 
 
 def combined_round(visits: int) -> int:
@@ -62,6 +95,11 @@ def combined_round(visits: int) -> int:
 def rounds_for(rounds: int, share: float) -> int:
     """Return in how many rounds to do a share of the moves that `rounds` were meant for, at least 1."""
     return max(1, min(rounds, round(rounds * share)))
+
+
+def _mean_stops(lengths: Integers) -> float:
+    """Mean length of the routes of UAVs that fly."""
+    return float(lengths.sum()) / max(1, int(np.count_nonzero(lengths)))
 
 
 def _visits(arrays: ProblemArrays) -> int:

@@ -26,9 +26,9 @@ from app.solvers.local_search.annealing import (
     set_routes,
 )
 from app.solvers.local_search.combination import Combination
-from app.solvers.local_search.effort import moves_a_second, rounds_for
+from app.solvers.local_search.effort import large_moves, moves_a_second, rounds_for
+from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import StopCriterion
-from app.solvers.scale import common_level, largest_level
 
 _PIECE_S = 0.002
 """Seconds between two looks at the stop criterion, about."""
@@ -40,7 +40,7 @@ _COLLECTED_FROM = 0.3
 """Share of a round after which routes are good enough to be collected."""
 
 _FREE = 0.002
-"""Cost of a leg between neighbours, in common levels, below which distance is as good as free."""
+"""Cost of a leg between neighbours, in common gains, below which distance is as good as free."""
 
 _FREE_HOT, _FREE_COLD = 0.3, 0.01
 """Temperatures there: rewards of plans lie further apart."""
@@ -51,14 +51,15 @@ _PATIENT_MOVES_A_STOP = 2_000
 
 
 class Cooling(NamedTuple):
-    """Temperatures of a round and the price of a useless visit, in levels.
+    """Temperatures of a round and the price of a useless visit, in what visits earn.
 
-    The hottest is in largest levels, the rest in common ones (:func:`~app.solvers.scale.common_level`).
+    The hottest is in largest gains, the rest in common ones (:func:`~app.solvers.local_search.scale.gains`).
 
     Attributes
     ----------
     hot, cold
-        The temperature falls geometrically from one to the other.
+        The temperature falls geometrically from one to the other: from where the largest gains are decided
+        on to where the common ones are, or what distances cost if that is less.
     penalty
         What a visit that unloads nothing costs during the search.
     guide
@@ -185,27 +186,29 @@ def _round(
     tell: Callable[[float], None],
 ) -> None:
     """One round of one search; the plan at its end is made legal."""
-    # It begins where the largest levels are decided on, and ends where the common ones are.
-    largest, scale = largest_level(search.arrays), common_level(search.arrays)
-    leg = _neighbour_leg(search)
+    largest, scale = gains(search.arrays, search.routes)
+    leg = neighbour_leg(search.arrays, search.near)
+    coldest = coldest_by_distance(search.arrays, leg, cooling.cold * scale)
     haste, thrift = 0.0, 0.0
     if float(search.arrays.terms["weight"][0]) * leg < _FREE * scale:
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
         haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
+        coldest = cooling.cold * scale
     piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
     done, share, told = 0, span.share(0), 0.0
     step = piece / span.moves
     stops, expected = int(search.routes.length.sum()), float(span.moves)
     if span.end < np.inf:
         expected = min(expected, moves_a_second(search.arrays) * (span.end - span.begin))
+    large, cost = large_moves(search.routes.length)
     while done < span.moves and share < 1.0 and not stop():
         count = min(piece, span.moves - done)
         begin = cooling.hot if span.end == np.inf else _begin(cooling, expected, stops)
-        ratio = cooling.cold / begin * (scale / largest)
+        ratio = coldest / (begin * largest)
         hot, cold = (begin * ratio**part * largest for part in (share, min(share + step, 1.0)))
         anneal(
-            search, rng, count, hot, cold, cooling.penalty * scale, haste, thrift,
-            share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav),
+            search, rng, max(1, round(count / cost)), hot, cold, cooling.penalty * scale, haste, thrift,
+            share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav), large,
         )  # fmt: skip
         done += count
         now = span.share(done)
@@ -223,7 +226,7 @@ def _begin(cooling: Cooling, moves: float, stops: int) -> float:
 
     Heat that there is no time to undo only costs (``tests/benchmarks/LOG.md``).
     """
-    heat = min(1.0, moves / (_PATIENT_MOVES_A_STOP * max(stops, 1)))
+    heat = min(1.0, math.cbrt(moves / (_PATIENT_MOVES_A_STOP * max(stops, 1))))
     return cooling.cold * (cooling.hot / cooling.cold) ** heat
 
 
@@ -242,14 +245,6 @@ def _share_best(searches: Sequence[Search]) -> None:
 
 def _silent(_share: float) -> None:
     """Only the first search tells how far it is."""
-
-
-def _neighbour_leg(search: Search) -> float:
-    """Return the mean distance between targets that are neighbours; 0 where there are none apart."""
-    near = search.near
-    legs = search.arrays.between[0, 0][near.wanted[:, None], near.near_target[near.wanted, :3]]
-    legs = legs[(legs < UNREACHABLE) & (legs > 0)]
-    return float(legs.mean()) if legs.size else 0.0
 
 
 def _guides(search: Search, cost: float, most: float, leg: float) -> tuple[float, float]:

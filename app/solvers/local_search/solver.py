@@ -45,7 +45,7 @@ def how_long(search: Search, moves: int | None, restarts: int | None, stop: Stop
     if moves is None:
         moves = default_moves(arrays) if math.isinf(stop.seconds_left()) else moves_within_limit(arrays)
     if restarts is None:
-        restarts = default_restarts(arrays, moves, int(search.routes.length.sum()))
+        restarts = default_restarts(arrays, moves, search.routes.length)
     return moves, restarts
 
 

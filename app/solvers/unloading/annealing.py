@@ -17,9 +17,8 @@ from app.simulation.decorators import compiled, compiled_nogil
 from app.simulation.deliveries import Unloading, any_limited, new_unloading
 from app.simulation.loads import serve_at_best
 from app.simulation.visit_lists import Visits, first_visit, note_flights
-from app.solvers.local_search.annealing import ROUNDING, Search, new_search, set_routes
-from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, feasible, undo
-from app.solvers.local_search.moves import draw_move
+from app.solvers.local_search.annealing import ROUNDING, Search, draw_change, new_search, set_routes
+from app.solvers.local_search.change import Change, apply, extra_closing, extra_distance, undo
 from app.solvers.local_search.routes import CLOSING, DISTANCE, Routes
 
 MOVES, WORK, SATISFACTION = 0, 1, 2
@@ -104,7 +103,13 @@ def keep_if_best(planned: PlannedSearch) -> None:
 
 @compiled_nogil
 def anneal_planned(
-    planned: PlannedSearch, rng: np.random.Generator, hot: float, cold: float, moves: int, work: float
+    planned: PlannedSearch,
+    rng: np.random.Generator,
+    hot: float,
+    cold: float,
+    moves: int,
+    work: float,
+    large: float,
 ) -> int:
     """Try moves while the temperature falls geometrically from `hot` towards `cold`.
 
@@ -120,6 +125,8 @@ def anneal_planned(
         How many to try, at least 1.
     work
         Visits to look at, after which it ends early.
+    large
+        Probability of a large move.
 
     Returns
     -------
@@ -135,7 +142,7 @@ def anneal_planned(
         tried += 1
         temperature *= cooling
         tally[WORK] += 1.0
-        if not draw_move(arrays, routes, search.near, change, rng) or not feasible(arrays, change):
+        if not draw_change(search, rng, large):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
         price = arrays.terms[0].weight * extra + closing

@@ -16,8 +16,9 @@ from app.simulation.visit import ALLOWED
 from app.solvers.bound.enumeration import is_tiny
 from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of
+from app.solvers.local_search.effort import large_moves
+from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import History, Progress, Proof, Report, Solution, Solver, StopCriterion
-from app.solvers.scale import largest_level
 from app.solvers.seeds import seed_sequence
 from app.solvers.stop import share_of_time
 from app.solvers.unloading.all_routes import AllRoutes
@@ -49,7 +50,7 @@ _PIECE_WORK = 100e3
 
 _ROUNDS = 3
 _HOT, _COLD = 0.03, 0.001
-"""Temperatures of a round at its begin and its end, in largest levels."""
+"""Temperatures of a round at its begin, in largest gains, and at its end, in common ones."""
 
 _PATIENT_MOVES_A_VISIT = 1_000
 """With fewer moves for each visit there can be, a search begins colder: heat would only cost reward."""
@@ -215,6 +216,9 @@ def _improve(
     moves, limit, heat = _MOVES_A_VISIT * visits, stop.seconds_left(), 0.0
     # With reloads this search finds most of what there is to find, and uses the time that it has.
     most = _LONGEST if arrays.n_bases and limit < math.inf else 1
+    largest, common = gains(arrays, planned.search.routes)
+    leg = neighbour_leg(arrays, near) if possible else 0.0
+    temperatures = _HOT * largest, coldest_by_distance(arrays, leg, _COLD * common)
     known = float(planned.search.best[0])
     for number in range(1, _ROUNDS + 1):
         while possible and not stop():
@@ -223,7 +227,7 @@ def _improve(
             )
             if share >= 1.0:
                 break
-            _piece(planned, rng, moves, heat, max(share, 0.0))
+            _piece(planned, rng, moves, heat, max(share, 0.0), temperatures)
             done = _share_done(planned, most * moves, most * _MOST_WORK, limit, stop)
             heat = min(1.0, planned.tally[MOVES] / max(done, 1e-9) / (_PATIENT_MOVES_A_VISIT * visits))
         # To unload a large plan at best takes a while, also when time is up.
@@ -241,10 +245,18 @@ def _share_done(planned: PlannedSearch, moves: int, work: float, limit: float, s
     return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / work, by_time))
 
 
-def _piece(planned: PlannedSearch, rng: np.random.Generator, moves: int, heat: float, share: float) -> None:
+def _piece(
+    planned: PlannedSearch,
+    rng: np.random.Generator,
+    moves: int,
+    heat: float,
+    share: float,
+    temperatures: tuple[float, float],
+) -> None:
     """Anneal for about 2 ms at the temperatures after a share of a round; `heat` 0 keeps to the lowest."""
-    scale = largest_level(planned.search.arrays)
     length = max(1, moves // 200)
     after = min(1.0, share + length * _ROUNDS / moves)
-    hot, cold = (_COLD * (_HOT / _COLD) ** (heat * (1 - at)) * scale for at in (share, after))
-    anneal_planned(planned, rng, hot, cold, length, _PIECE_WORK)
+    hottest, coldest = temperatures
+    large, _ = large_moves(planned.search.routes.length)
+    hot, cold = (coldest * (hottest / coldest) ** (heat * (1 - at)) for at in (share, after))
+    anneal_planned(planned, rng, hot, cold, length, _PIECE_WORK, large)

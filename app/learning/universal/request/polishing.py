@@ -50,6 +50,6 @@ def polish(
         best.consider(actions_of(search)[None])
         watch(done)
 
-    restarts = default_restarts(arrays, moves, int(search.routes.length.sum()))
+    restarts = default_restarts(arrays, moves, search.routes.length)
     improve(search, rng, moves, restarts + 1, _COOLING, stop, tell)
     best.consider(actions_of(search)[None])
