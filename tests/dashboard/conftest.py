@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 from dashboard_steps import PATIENCE_MS
 from live_service import LiveService
+from page_files import read_files
 from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from app.api.application import create_application
+from app.settings import Settings
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = (
@@ -117,3 +121,20 @@ def shared_page(browser, service) -> Iterator[Page]:
     """
     with _dashboard(browser, service.url) as opened:
         yield opened
+
+
+@pytest.fixture(scope="session")
+def openapi(tmp_path_factory) -> dict:
+    """The description of the service, from which the page knows all fields."""
+    return create_application(Settings(data_dir=tmp_path_factory.mktemp("described"))).openapi()
+
+
+@pytest.fixture
+def read(openapi):
+    """Reads files as the page does; several at once where there are several."""
+
+    def reading(*files):
+        found = read_files(openapi, files)
+        return found[0] if len(files) == 1 else found
+
+    return reading
