@@ -1,10 +1,17 @@
-"""Three lives of a service on one database: it is killed, stopped with no time, and stopped with some."""
+"""Three lives of a service on one database: it is killed, stopped with no time, and stopped with some.
+
+The first begins with what an earlier version left behind, killed in the midst of its work. `released/` has
+what such versions wrote, as SQL: a service of that version was given work and killed, and of its library all
+policies but one were taken out to keep the file small.
+"""
 
 import json
 import signal
 import socket
+import sqlite3
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import httpx
@@ -13,6 +20,13 @@ from answers import but_for_reasons
 
 from app.api.openapi_examples import example_problem
 
+RELEASED = sorted((Path(__file__).parent / "released").glob("*.sql"))
+KEY = "b5e511898713.uLlAWJA7SNsdFL69Qxh7_8hFlJZjhz5RKpHSIqtOvhM"
+"""Of the role `library`, made with that version."""
+
+ALLOCATED, TRAINED = "4019113ae68d4ce68b7732e5d8a46f19", "3e89b68c8d99469bb073d3e700ca7e45"
+RUNNING, WAITING = "eec8b514134348ae8adf49ca040d0a97", "b7bc0d6f5dc1488588c6a9832962575d"
+BEARER = {"Authorization": f"Bearer {KEY}"}
 ASYNC = {"Prefer": "respond-async"}
 # A clean end is followed by the signal that asked for it, as a shell expects.
 ENDED = (0, -signal.SIGTERM)
@@ -34,14 +48,64 @@ def lines_of(response):
     return [json.loads(line) for line in response.iter_lines()]
 
 
+def state_after(client, job_id):
+    """Follow a job to its end, and return how it ended."""
+    with client.stream("GET", f"/jobs/{job_id}/events") as stream:
+        for _ in stream.iter_lines():
+            pass
+    return client.get(f"/jobs/{job_id}").json()["status"]
+
+
+@pytest.fixture(scope="module", params=RELEASED, ids=lambda file: file.stem)
+def data_folder(request, tmp_path_factory):
+    """A folder with the database of an earlier version."""
+    folder = tmp_path_factory.mktemp("data")
+    with sqlite3.connect(folder / "allocator.sqlite3") as connection:
+        connection.executescript(request.param.read_text())
+    connection.close()
+    return folder
+
+
 @pytest.fixture(scope="module")
-def killed(start_for_module):
+def start(start_for_module):
+    """Starts services with the client of one who has the key."""
+
+    def started(**settings):
+        service = start_for_module(workers=1, **settings)
+        service.client.headers.update(BEARER)
+        return service
+
+    return started
+
+
+@pytest.fixture(scope="module")
+def killed(start):
     """The first life: what it was given and has answered, and who waits when it is killed."""
-    service = start_for_module(workers=1, max_checkpoint_bytes=10**6)
+    # Places for what the earlier version had in its queue, too.
+    service = start(max_checkpoint_bytes=10**6, queue_limit=4)
     client = service.client
     cold = client.get("/readyz")
+    without_key = httpx.get(f"{client.base_url}/jobs")
     at_once = client.post("/allocate", json={**PROBLEM, "algorithm": "greedy"})
     service.await_ready()
+    for job_id in (RUNNING, WAITING):
+        state_after(client, job_id)
+    jobs = {job_id: client.get(f"/jobs/{job_id}").json() for job_id in (ALLOCATED, TRAINED, RUNNING, WAITING)}
+    source = jobs[TRAINED]["result"]["policy_id"]
+    small = {**PROBLEM, "uavs": PROBLEM["uavs"][:2], "targets": PROBLEM["targets"][:3]}
+    parameters = {
+        "mode": "paper", "source": source, "drqn_hidden_dim": 4, "qmix_hidden_dim": 2, "n_epochs": 3
+    }  # fmt: skip
+    earlier = SimpleNamespace(
+        source=source,
+        without_key=without_key,
+        jobs=jobs,
+        policy=client.get(f"/library/{source}").json(),
+        weights=client.get(f"/library/{source}/checkpoint"),
+        transferred=client.post(
+            "/allocate", json={**small, "algorithm": "transfer_qmix", "parameters": parameters}
+        ).json(),
+    )
     answer = client.post("/allocate", json={**PROBLEM, **QUICK}, headers=QUICK_KEY).json()
     policy = client.post("/library", json={"name": "kept", "job_id": answer["job_id"]}).json()
     job = client.get(f"/jobs/{answer['job_id']}").json()
@@ -49,25 +113,21 @@ def killed(start_for_module):
     waiting = later(client, {**PROBLEM, "algorithm": "greedy"})
     service.stop(signal.SIGKILL)
     return SimpleNamespace(
-        cold=cold, at_once=at_once, answer=answer, policy=policy, job=job, running=running, waiting=waiting
-    )
+        earlier=earlier, cold=cold, at_once=at_once, answer=answer, policy=policy, job=job,
+        running=running, waiting=waiting,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def stopped(killed, start_for_module):
+def stopped(killed, start):
     """The second life: it goes on with the first, and is stopped with streams open and a batch half done."""
-    service = start_for_module(workers=1).await_ready()
+    service = start().await_ready()
     client = service.client
     again = client.post("/allocate", json={**PROBLEM, **QUICK}, headers=QUICK_KEY).json()
     job = client.get(f"/jobs/{killed.job['id']}").json()
     policy = client.get(f"/library/{killed.policy['id']}").json()
     client.delete(f"/jobs/{killed.running}")
-    states = []
-    for identifier in (killed.running, killed.waiting):
-        with client.stream("GET", f"/jobs/{identifier}/events") as stream:
-            for _ in stream.iter_lines():
-                pass
-        states.append(client.get(f"/jobs/{identifier}").json()["status"])
+    states = [state_after(client, job_id) for job_id in (killed.running, killed.waiting)]
 
     with client.stream("POST", "/allocate/batch", json=BATCH, headers=BATCH_KEY) as batch:
         received = batch.iter_lines()
@@ -90,11 +150,20 @@ def stopped(killed, start_for_module):
 
 
 @pytest.fixture(scope="module")
-def last(stopped, start_for_module):
+def last(stopped, start):
     """The third life, which has some seconds for its end."""
-    service = start_for_module(workers=1, shutdown_grace_s=6.0).await_ready()
+    service = start(shutdown_grace_s=6.0).await_ready()
     service.client.delete(f"/jobs/{stopped.long}")
     return service
+
+
+def test_everything_of_an_earlier_version_is_there_and_what_was_begun_is_done(killed):
+    earlier = killed.earlier
+    assert earlier.without_key.status_code == 401
+    assert {job["status"] for job in earlier.jobs.values()} == {"succeeded"}
+    assert earlier.policy["name"] == "kept"
+    assert earlier.weights.headers["etag"].strip('"') == earlier.policy["checkpoint"]["sha256"]
+    assert earlier.transferred["source_policy"]["id"] == earlier.source
 
 
 def test_it_takes_jobs_before_it_is_ready(killed):
@@ -132,13 +201,13 @@ def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(la
     answers = {}
 
     def ask(name, body):
-        with httpx.Client(base_url=url, timeout=60) as client:
+        with httpx.Client(base_url=url, timeout=60, headers=BEARER) as client:
             answers[name] = client.post("/allocate", json=body)
 
     def ask_for_many():
         body = {"problems": [{**PROBLEM, **LONG}]}
         with (
-            httpx.Client(base_url=url, timeout=60) as client,
+            httpx.Client(base_url=url, timeout=60, headers=BEARER) as client,
             client.stream("POST", "/allocate/batch", json=body) as stream,
         ):
             answers["batch"] = lines_of(stream)
@@ -155,7 +224,8 @@ def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(la
     while unfinished_jobs() < 3:
         time.sleep(0.01)
     unfinished = socket.create_connection((url.host, url.port))
-    unfinished.sendall(b"POST /allocate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{")
+    head = f"POST /allocate HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {KEY}\r\n"
+    unfinished.sendall(f"{head}Content-Length: 10\r\n\r\n{{".encode())
     last.client.get("/healthz")  # what was sent before has arrived
 
     last.process.send_signal(signal.SIGTERM)
