@@ -15,10 +15,6 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from alembic import command
-from alembic.config import Config
-from alembic.script.revision import ResolutionError
-from alembic.util import CommandError
 from sqlalchemy import URL, Connection, Engine, make_url
 from sqlalchemy.exc import ArgumentError
 
@@ -219,6 +215,12 @@ class Database:
             If the folder does not know the version that is recorded (the database is newer than the
             program), or rows would refer to nothing afterwards.
         """
+        # Slow to load, and workers migrate nothing.
+        from alembic import command  # noqa: PLC0415 - as above
+        from alembic.config import Config  # noqa: PLC0415 - as above
+        from alembic.script.revision import ResolutionError  # noqa: PLC0415 - as above
+        from alembic.util import CommandError  # noqa: PLC0415 - as above
+
         config = Config()
         config.set_main_option("script_location", str(script_location).replace("%", "%%"))
         with _migration_lock, self._writers.hold(), self._migration_engine.begin() as connection:

@@ -46,7 +46,8 @@ _INLINE_SCRIPT = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 
 def _name_limits(components: dict[str, Any], settings: Settings) -> None:
-    """Say in the schemas how large a problem may be here, which is the operator's to set."""
+    """Say in the schemas how large a problem and a batch may be here, which is the operator's to set."""
+    components["BatchRequest"]["properties"]["problems"]["maxItems"] = settings.batch_limit
     for each in declared_fields(Problem):
         for name in ("ProblemModel", "AllocationRequest"):
             _limit(components[name]["properties"][each.name], each, settings)

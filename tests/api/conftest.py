@@ -1,7 +1,7 @@
 """Services for the tests of this folder, with small limits: one with two workers for all, and others.
 
 One takes more than ten seconds of a core to start. A test that needs another setting, or ends its service,
-takes one that is there already if it can: `narrow` for few places, the lives of `test_restarts.py` for ends.
+takes one that is there already if it can: `narrow` for one worker, the lives of `test_restarts.py` for ends.
 """
 
 import json
@@ -81,8 +81,11 @@ def service(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def narrow(tmp_path_factory):
-    """A service with one worker, where few problems of batches may wait."""
-    running = Service(tmp_path_factory.mktemp("narrow"), workers=1, queue_limit=10, batch_limit=3)
+    """A service with one worker, small batches, and places for all that Schemathesis asks for.
+
+    Its source policies may be gone.
+    """
+    running = Service(tmp_path_factory.mktemp("narrow"), workers=1, queue_limit=64, batch_limit=3)
     try:
         yield running.await_ready()
     finally:
@@ -113,9 +116,15 @@ def start_service(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def start_for_module(tmp_path_factory):
+def data_folder(tmp_path_factory):
+    """The data folder of the services of a module."""
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="module")
+def start_for_module(data_folder):
     """Starts services for all tests of a module."""
-    with starting(tmp_path_factory.mktemp("data")) as start:
+    with starting(data_folder) as start:
         yield start
 
 

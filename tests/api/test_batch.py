@@ -64,7 +64,8 @@ def test_too_many_are_refused_and_more_than_there_are_places_wait(narrow, item):
     client = narrow.await_ready().client
     refused = client.post("/allocate/batch", json={"problems": [item] * 4})
     assert (refused.status_code, refused.json()["type"]) == (422, "batch-too-large")
-    assert refused.json()["limit"] == 3
+    described = client.get("/openapi.json").json()["components"]["schemas"]["BatchRequest"]
+    assert refused.json()["limit"] == described["properties"]["problems"]["maxItems"] == 3
     # Two batches of three, of which four wait at least: one has to be patient.
     slow = {**item, "algorithm": "local_search", "parameters": {}, "time_limit_s": 0.3}
     with (

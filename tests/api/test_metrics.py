@@ -1,20 +1,6 @@
 """Metrics: requests and jobs are counted where they belong, and nothing a client makes up becomes a label."""
 
-import os
-import signal
-import time
-
-from prometheus_client.parser import text_string_to_metric_families
-
-
-def samples(client):
-    """The samples by name and labels."""
-    text = client.get("/metrics").text
-    return {
-        (sample.name, *sorted(sample.labels.items())): sample.value
-        for family in text_string_to_metric_families(text)
-        for sample in family.samples
-    }
+from metric_samples import samples
 
 
 def grown(before, after, name, **labels):
@@ -69,33 +55,3 @@ def test_levels_are_those_of_this_moment(client):
     assert levels[("allocator_database_bytes",)] >= 4096
     assert levels[("process_resident_memory_bytes",)] > 1e6
     assert client.get("/metrics").headers["content-type"].startswith("text/plain; version=0.0.4")
-
-
-def test_replaced_workers_are_counted(narrow):
-    restarts = ("allocator_worker_restarts_total",)
-    assert samples(narrow.await_ready().client)[restarts] == 0
-
-    # Its worker, and the process that answers beside it.
-    processes = workers_of(narrow.process.pid)
-    assert len(processes) == 2
-    for process in processes:
-        os.kill(process, signal.SIGKILL)
-    while samples(narrow.client)[restarts] < 2:
-        assert narrow.process.poll() is None
-        time.sleep(0.01)
-    assert samples(narrow.client)[restarts] == 2
-
-
-def workers_of(pid):
-    """The worker processes of a service, which multiprocessing starts as spawn_main."""
-    found = []
-    for entry in os.listdir("/proc"):
-        if entry.isdigit():
-            try:
-                with open(f"/proc/{entry}/stat") as stat, open(f"/proc/{entry}/cmdline") as command:
-                    parent = int(stat.read().rpartition(")")[2].split()[1])
-                    if parent == pid and "spawn_main" in command.read():
-                        found.append(int(entry))
-            except OSError:
-                continue
-    return found

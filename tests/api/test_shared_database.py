@@ -2,9 +2,12 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from live_service import kill, workers_of
+from metric_samples import samples
 from postgresql_server import PostgresqlServer
 
 ROOT = Path(__file__).parents[2]
@@ -96,3 +99,20 @@ def test_the_command_line_works_on_the_same_database(server, tmp_path):
     refused = run("backup", str(tmp_path / "copy"))
     assert refused.returncode == 1
     assert "pg_dump" in refused.stderr
+
+
+def test_replaced_workers_are_counted(two):
+    """Here, where a service ends soon: the new workers are hardly begun."""
+    service = two[1]
+    restarts = ("allocator_worker_restarts_total",)
+    assert samples(service.client)[restarts] == 0
+
+    # Its worker, and the process that answers beside it.
+    processes = workers_of(service.process.pid)
+    assert len(processes) == 2
+    for process in processes:
+        kill(process)
+    while samples(service.client)[restarts] < 2:
+        assert service.process.poll() is None
+        time.sleep(0.01)
+    assert samples(service.client)[restarts] == 2

@@ -45,7 +45,7 @@ def test_a_time_that_is_up_at_once_gives_a_legal_plan(client, algorithm, unloadi
 def test_whoever_waits_is_answered_when_the_time_is_up(narrow, problem):
     client = narrow.await_ready().client
     holder = client.post("/allocate", json=problem | ENDLESS, headers={"Prefer": "respond-async"}).json()
-    request = problem | {"algorithm": "transfer_qmix", "time_limit_s": 0.3}
+    request = problem | {"algorithm": "local_search", "time_limit_s": 0.3}
     later = client.post("/allocate", json=request, headers={"Prefer": "respond-async"}).json()
 
     answer = client.post("/allocate", json=request)
@@ -53,7 +53,7 @@ def test_whoever_waits_is_answered_when_the_time_is_up(narrow, problem):
     assert answer.status_code == 200
     told = answer.json()
     assert sound(problem, told) > 0
-    assert (told["algorithm"], told["answered_by"]) == ("transfer_qmix", "greedy")
+    assert (told["algorithm"], told["answered_by"]) == ("local_search", "greedy")
     assert told["reasons"] == "pending"
     with client.stream("GET", f"/jobs/{later['id']}/events") as events:
         last = [json.loads(line[5:]) for line in events.iter_lines() if line.startswith("data:")][-1]

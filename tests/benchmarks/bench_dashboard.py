@@ -1,10 +1,11 @@
 """How long the dashboard takes to redraw, at 100 UAVs by 300 areas and at the service's most, 1000 by 2000.
 
-Run it with ``python tests/benchmarks/bench_dashboard.py``. It starts a service and Debian's Chromium, and
-at each size opens a problem, edits one area, allocates it greedily, goes through the views and drags the
-map forty times. A pan is measured from each movement of the pointer until the frame with it has been drawn,
-all else from the call until the frame after it. The limit is 50 ms for a pan at 100 by 300; without a
-graphics card, the browser's own rasteriser is in the figures.
+Run it with ``CHROMIUM=/usr/bin/chromium python tests/benchmarks/bench_dashboard.py``: the browser with
+windows, not the shell that the tests prefer. It starts a service and the browser, and at each size opens a
+problem, edits one area, allocates it greedily, goes through the views and drags the map forty times. A pan
+is measured from each movement of the pointer until the frame with it has been drawn, all else from the call
+until the frame after it. The limit is 50 ms for a pan at 100 by 300; without a graphics card, the browser's
+own rasteriser is in the figures.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The largest problem that a service takes by default is reached and changed; a large answer has portions.
 
-Portions are of a hundred UAVs, so that an answer with 250 has several.
+Portions are of a hundred UAVs, so that an answer with 220 has several.
 """
 
 import json
@@ -56,7 +56,7 @@ def test_every_row_can_be_reached_and_changed_and_few_are_there(page):
 
 
 def test_its_answer_is_shown_in_portions_and_the_selected_is_always_there(page, service):
-    open_large(page, 250, 500)
+    open_large(page, 220, 300)
     answer = show_answer(page, service.url, algorithm="greedy", time_limit_s=20)
     flown = [route for route in answer["routes"] if route["stops"]]
     assert len(flown) > 200

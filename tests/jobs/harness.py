@@ -76,6 +76,31 @@ async def running(where: Path | str, *, grace_s: float = 0.0, **settings: Any) -
         database.dispose()
 
 
+@asynccontextmanager
+async def two_services(url: str, **settings: Any) -> AsyncIterator[tuple[JobService, JobService]]:
+    """Run two services on one database, whose queue hardly ends."""
+    options = {"max_queued": 1000, **settings}
+    async with running(url, **options) as one, running(url, **options) as other:
+        yield one, other
+
+
+def make_completions(url: str) -> None:
+    """Make the table in which completions are counted, before several services would at once."""
+    database = database_of(url)
+    with database.write() as connection:
+        connection.execute(sa.text("CREATE TABLE completions (job_id TEXT)"))
+    database.dispose()
+
+
+def completions_of(url: str) -> Sequence[str]:
+    """Return the jobs that were completed, one as often as it was."""
+    database = database_of(url)
+    with database.read() as connection:
+        found = connection.scalars(sa.text("SELECT job_id FROM completions")).all()
+    database.dispose()
+    return found
+
+
 async def eventually(condition: Callable[[], bool | Awaitable[bool]]) -> None:
     """Look until a condition holds; that it does not is an error, after a patience no test comes near."""
     deadline = time.monotonic() + PATIENCE_S

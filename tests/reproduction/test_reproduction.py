@@ -3,6 +3,7 @@
 import json
 import shutil
 from statistics import fmean
+from types import SimpleNamespace
 
 import pytest
 from referee import replay
@@ -109,36 +110,48 @@ def test_progress_ends_with_all_runs(scale, out, said):
     assert [done for done, _ in said] == sorted(done for done, _ in said)
 
 
-def test_a_second_run_writes_the_same_bytes(scale, out, tmp_path):
-    assert reproduce(scale, tmp_path, 1, None, lambda _done, _word: None)
+@pytest.fixture(scope="module")
+def again(scale, out, tmp_path_factory):
+    """A second run, in one process, in a folder that has the records of some runs.
+
+    All but two of them are as they were: one is damaged, and one is of other parameters.
+    """
+    folder = tmp_path_factory.mktemp("second")
+    there = [run for run in runs_of(scale) if run.method in ("ga", "greedy")][1:]
+    for run in there:
+        for inside in (f"runs/{run.id}.json", f"timings/{run.id}.json"):
+            (folder / inside).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(out / inside, folder / inside)
+    files = [folder / "runs" / f"{run.id}.json" for run in there]
+    damaged, other, *kept = files
+    damaged.write_text("{", encoding="utf-8")
+    changed = json.loads(other.read_bytes())
+    changed["run"]["parameters"] = {"iteration": 1}
+    other.write_text(json.dumps(changed), encoding="utf-8")
+    kept = {file: file.stat().st_mtime_ns for file in kept}
+    told = []
+    assert reproduce(scale, folder, 1, None, lambda done, word: told.append((done, word)))
+    return SimpleNamespace(folder=folder, there=there, kept=kept, told=told)
+
+
+def test_a_second_run_writes_the_same_bytes(out, again):
     compared = 0
     for file in sorted(out.rglob("*")):
         inside = file.relative_to(out)
         if file.is_file() and inside.parts[0] not in TIMED:
-            assert (tmp_path / inside).read_bytes() == file.read_bytes(), inside
+            assert (again.folder / inside).read_bytes() == file.read_bytes(), inside
             compared += 1
     assert compared > 30
     assert {p.suffix for p in (out / "figures").iterdir()} == {".svg", ".png"}
 
 
-def test_finished_runs_are_not_repeated(scale, out, tmp_path):
-    folder = shutil.copytree(out, tmp_path / "copy")
-    runs = [run for run in runs_of(scale) if run.method in ("ga", "greedy")]
-    missing, damaged, other = (folder / "runs" / f"{run.id}.json" for run in runs[:3])
-    expected = other.read_bytes()
-    missing.unlink()
-    damaged.write_text("{", encoding="utf-8")
-    changed = json.loads(expected)
-    changed["run"]["parameters"] = {"iteration": 1}
-    other.write_text(json.dumps(changed), encoding="utf-8")
-    kept = {p: p.stat().st_mtime_ns for p in (folder / "runs").rglob("*.json") if p != missing}
-    steps = list(do_runs(runs, folder, 1))
-    assert [step.finished for step in steps] == [len(runs) - 3, len(runs) - 2, len(runs) - 1, len(runs)]
-    assert {step.last.id for step in steps[1:]} == {run.id for run in runs[:3]}
-    assert other.read_bytes() == expected
-    rewritten = {p for p, at in kept.items() if p.stat().st_mtime_ns != at}
-    assert rewritten == {damaged, other}
-    assert [step.finished for step in do_runs(runs, folder, 1)] == [len(runs)]
+def test_finished_runs_are_not_repeated(scale, again):
+    runs = runs_of(scale)
+    assert [done for done, _ in again.told] == list(range(len(again.kept), len(runs) + 1))
+    kept = {run.id for run in again.there[2:]}
+    assert {word for _, word in again.told[1:]} == {run.id for run in runs} - kept
+    assert all(file.stat().st_mtime_ns == at for file, at in again.kept.items())
+    assert [step.finished for step in do_runs(runs, again.folder, 1)] == [len(runs)]
 
 
 def test_everything_says_where_it_comes_from(scale, out):

@@ -1,5 +1,7 @@
 """What remains of a plan at a moment: nothing is lost, and what was planned can still be flown."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from problems import random_plan
@@ -11,27 +13,27 @@ from app.simulation.breaches import breaches_of
 from app.simulation.explain import timed_routes
 from app.simulation.mid_mission import remaining_at
 
+MOMENTS = 250
 
-def moments(count, draw=random_world):
-    """Random problems with a plan, its routes, and a moment of it."""
+
+@cache
+def moments(draw=random_world):
+    """Random problems, the routes of a plan of each, what remains at a moment of it, and that moment."""
     rng = np.random.default_rng(3)
-    while count:
+    found = []
+    while len(found) < MOMENTS:
         problem = draw(rng)
         plan = random_plan(problem, rng)
         routes = timed_routes(problem, plan)
         ends = [route.landing.time for route in routes if route.landing]
         if ends:
-            count -= 1
-            yield (
-                problem,
-                routes,
-                remaining_at(problem, plan, at := float(rng.uniform(0, 1.1 * max(ends)))),
-                at,
-            )
+            at = float(rng.uniform(0, 1.1 * max(ends)))
+            found.append((problem, routes, remaining_at(problem, plan, at), at))
+    return found
 
 
 def test_what_was_unloaded_is_gone_and_what_was_not_is_still_there():
-    for problem, routes, left, at in moments(150):
+    for problem, routes, left, at in moments():
         for i, (before, now) in enumerate(zip(problem.uavs, left.uavs, strict=True)):
             begun = [stop for stop in routes[i].stops if stop.begin_time <= at] if not before.ret else []
             gone = np.sum([stop.delivered for stop in begun], axis=0) if begun else 0.0
@@ -46,7 +48,7 @@ def test_what_was_unloaded_is_gone_and_what_was_not_is_still_there():
 
 def test_the_rest_of_the_plan_is_legal_and_as_it_was():
     later = same = 0
-    for problem, routes, left, at in moments(250):
+    for problem, routes, left, at in moments():
         rest = Plan(left.start_plan)
         assert not breaches_of(left, rest)
         # On the globe a leg in wind that begins on the way has another initial bearing.
@@ -70,7 +72,7 @@ def test_the_rest_of_the_plan_is_legal_and_as_it_was():
 
 def test_a_uav_between_two_places_is_committed_to_where_it_flies():
     under_way = 0
-    for problem, routes, left, at in moments(150):
+    for problem, routes, left, at in moments():
         for before, now, route in zip(problem.uavs, left.uavs, routes, strict=True):
             ahead = [stop for stop in route.stops if stop.begin_time > at]
             moved = (now.x_c, now.y_c) != (before.x_c, before.y_c)
@@ -91,7 +93,7 @@ def begun_by(route, at):
 
 def test_with_bases_loads_and_stocks_are_what_has_been_taken_and_brought():
     reloads = 0
-    for problem, routes, left, at in moments(200, random_sorties):
+    for problem, routes, left, at in moments(random_sorties):
         taken = {base.id: np.zeros(problem.n_materials) for base in problem.bases}
         for before, now, route in zip(problem.uavs, left.uavs, routes, strict=True):
             load = np.array(before.loadlist)
@@ -113,7 +115,7 @@ def test_with_bases_loads_and_stocks_are_what_has_been_taken_and_brought():
 
 def test_with_bases_the_rest_of_the_plan_is_legal_and_as_it_was():
     later = same = 0
-    for problem, routes, left, at in moments(250, random_sorties):
+    for problem, routes, left, at in moments(random_sorties):
         rest = Plan(left.start_plan)
         assert not breaches_of(left, rest)
         loose = 1e-2 if problem.wind and problem.crs == "wgs84" else 1e-6

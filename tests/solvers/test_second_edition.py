@@ -42,7 +42,8 @@ def best_plan(body: dict[str, Any], legs: Legs) -> float | None:
         longest = max(1, *map(len, chosen))
         return [[route[s] if s < len(route) else n for route in chosen] for s in range(longest)]
 
-    possible = []
+    possible: list[list[tuple[int, ...]]] = []
+    count = 1
     for i in range(m):
         own = []
         for route in routes:
@@ -52,12 +53,10 @@ def best_plan(body: dict[str, Any], legs: Legs) -> float | None:
                 if broken.args[2] != "useless":
                     continue
             own.append(route)
+            if count * len(own) > MOST_PLANS:
+                return None
         possible.append(own)
-    count = 1
-    for own in possible:
         count *= len(own)
-    if count > MOST_PLANS:
-        return None
     best = -float("inf")
     for chosen in itertools.product(*possible):
         try:

@@ -92,11 +92,7 @@ class LiveService:
 
     def workers(self) -> list[int]:
         """Return the process ids of the workers there are."""
-        found = []
-        for folder in Path("/proc").iterdir():
-            if folder.name.isdigit() and _parent(folder) == self.pid and b"spawn_main" in _command(folder):
-                found.append(int(folder.name))
-        return sorted(found)
+        return workers_of(self.pid)
 
     def kill(self) -> None:
         """Kill the server as `kill -9` does; its workers notice by themselves."""
@@ -126,6 +122,15 @@ class LiveService:
         """Return the metrics by name and labels, as `allocator_worker_restarts_total`."""
         text = httpx.get(self.url + "/metrics", timeout=30).text
         return {name + labels: float(value) for name, labels, value in _SAMPLE.findall(text)}
+
+
+def workers_of(pid: int) -> list[int]:
+    """Return the worker processes of a server, which multiprocessing starts as spawn_main."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit() and _parent(folder) == pid and b"spawn_main" in _command(folder):
+            found.append(int(folder.name))
+    return sorted(found)
 
 
 def kill(pid: int) -> None:

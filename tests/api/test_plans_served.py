@@ -1,0 +1,109 @@
+"""Plans to take away as the service sends them: files, their types and names, and what it refuses."""
+
+import io
+import json
+import zipfile
+
+import pytest
+from mission_files import WAYPOINT, check_as_qgroundcontrol, commands
+
+from app.api.openapi_examples import example_problem
+
+
+@pytest.fixture(scope="module")
+def flown(service):
+    """The job and the answer of an allocation on a geographic problem."""
+    body = {**example_problem("cyclone-idai"), "algorithm": "greedy", "parameters": {}}
+    return body, service.client.post("/allocate", json=body).raise_for_status().json()
+
+
+def take(client, answer, format, **choices):
+    return client.get(f"/jobs/{answer['job_id']}/plan", params={"format": format, **choices})
+
+
+@pytest.mark.parametrize(("format", "ending"), [("qgc-plan", ".plan"), ("qgc-wpl", ".waypoints")])
+def test_flight_files_of_all_uavs_come_in_an_archive(client, flown, format, ending):
+    body, answer = flown
+
+    response = take(client, answer, format, delivery="gripper", altitude=120)
+
+    assert response.status_code == 200, response.text
+    assert response.headers["content-type"] == "application/zip"
+    archive = zipfile.ZipFile(io.BytesIO(response.content))
+    places = {target["id"]: [target["y"], target["x"]] for target in body["targets"]}
+    flying = [route for route in answer["routes"] if route["stops"]]
+    assert len(archive.namelist()) == len(flying)
+    for name, route in zip(archive.namelist(), flying, strict=True):
+        assert name.endswith(ending)
+        text = archive.read(name).decode()
+        alone = take(client, answer, format, delivery="gripper", altitude=120, uav=route["uav_id"])
+        assert alone.text == text
+        if format == "qgc-plan":
+            content = json.loads(text)
+            check_as_qgroundcontrol(content)
+            flown_to = [i["params"][4:6] for i in content["mission"]["items"] if i["command"] == WAYPOINT]
+        else:
+            codes, loader = commands(text)
+            points = [loader.wp(i) for i, code in enumerate(codes) if i and code == WAYPOINT]
+            flown_to = [[point.x, point.y] for point in points]
+        for (latitude, longitude), stop in zip(flown_to, route["stops"], strict=True):
+            assert [latitude, longitude] == pytest.approx(places[stop["target_id"]], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("format", "media_type"),
+    [("geojson", "application/geo+json"), ("csv", "text/csv"), ("html", "text/html")],
+)
+def test_documents_come_with_their_type_and_name(client, flown, format, media_type):
+    _, answer = flown
+
+    response = take(client, answer, format)
+
+    assert response.status_code == 200
+    assert response.headers["content-type"].split(";")[0] == media_type
+    assert answer["job_id"][:8] in response.headers["content-disposition"]
+    for stop in answer["routes"][0]["stops"]:
+        assert stop["target_id"] in response.text
+
+
+def test_flight_files_of_a_local_problem_are_refused(client, problem):
+    answer = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
+
+    refused = take(client, answer, "qgc-plan")
+
+    assert refused.status_code == 409
+    assert refused.json()["type"] == "plan-not-geographic"
+    assert refused.json()["errors"] == [{"pointer": "/crs", "detail": "'local'; 'qgc-plan' needs 'wgs84'"}]
+    assert take(client, answer, "csv").status_code == 200
+    assert take(client, answer, "geojson").json()["coordinates_are"] == "x and y, local"
+
+
+@pytest.mark.parametrize(
+    ("choices", "parameter"),
+    [
+        ({"altitude": 0}, "altitude"),
+        ({"altitude": "nan"}, "altitude"),
+        ({"altitude": 1e9}, "altitude"),
+        ({"delivery": "catapult"}, "delivery"),
+        ({"servo_pwm": 100}, "servo_pwm"),
+        ({"format": "kml"}, "format"),
+    ],
+)
+def test_choice_out_of_range_is_named(client, flown, choices, parameter):
+    refused = client.get(f"/jobs/{flown[1]['job_id']}/plan", params={"format": "qgc-plan", **choices})
+
+    assert refused.status_code == 422
+    assert [error["parameter"] for error in refused.json()["errors"]] == [parameter]
+
+
+def test_job_without_plan_and_unknown_uav_are_told_apart(client, problem, flown):
+    unknown = take(client, flown[1], "qgc-wpl", uav="nobody")
+    nowhere = client.get(f"/jobs/{'0' * 32}/plan", params={"format": "csv"})
+    body = {**problem, "algorithm": "qmix", "parameters": {"n_epochs": 10_000_000}}
+    running = client.post("/allocate", json=body, headers={"Prefer": "respond-async"}).json()
+    early = client.get(f"/jobs/{running['id']}/plan", params={"format": "csv"})
+    client.delete(f"/jobs/{running['id']}")
+
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "uav-not-found")
+    assert (nowhere.status_code, nowhere.json()["type"]) == (404, "job-not-found")
+    assert (early.status_code, early.json()["type"]) == (409, "no-plan")
