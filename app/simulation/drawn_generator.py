@@ -136,15 +136,14 @@ def _starts(m: int, rng: np.random.Generator) -> Floats:
 def _needs(n: int, k: int, rng: np.random.Generator) -> Floats:
     """Whole numbers or any, of one size or of many, of all materials or of some."""
     kind = rng.random()
-    need: Floats
     if kind < 0.4:
         need = rng.integers(0, 7, (n, k)).astype(np.float64)
     elif kind < 0.6:
         need = np.ones((n, k))
     else:
-        need = np.round(np.exp(rng.normal(1.5, rng.uniform(0.2, 1.5), (n, k))), 2)
+        need = np.asarray(np.exp(rng.normal(1.5, rng.uniform(0.2, 1.5), (n, k))).round(2))
     if k > 1 and rng.random() < 0.5:
-        need = np.where(rng.random((n, k)) < 0.6, need, 0.0)
+        need[rng.random((n, k)) >= 0.6] = 0.0
     return need
 
 
