@@ -68,7 +68,7 @@ def apply(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # no
     payload
         ``state``, a record; ``matrices`` of the problem, or None; ``event``, a record, and its ``at``;
         ``positions``, by the ids of UAVs, those that came since the state; and for an event about a proposal
-        ``proposal``: its ``routes`` and ``done``, how many stops were done when it was made.
+        ``proposal``: its ``stops`` and ``done``, how many stops were done when it was made.
     context
         Not used: this takes milliseconds.
 
@@ -123,7 +123,7 @@ def apply(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # no
 
 def _carried(proposal: Mapping[str, Any], state: MissionState) -> Routes:
     """Return what is left of a proposal after the stops that were made since."""
-    routes = [tuple(map(Stop.from_record, route)) for route in proposal["routes"]]
+    routes = [tuple(map(Stop.from_record, route)) for route in proposal["stops"]]
     since: dict[str, list[Stop]] = {uav.id: [] for uav in state.problem.uavs}
     for each in state.done[proposal["done"] :]:
         since[each.uav_id].append(each.stop)

@@ -217,7 +217,7 @@ def test_an_event_from_the_past_is_refused():
 def test_a_proposal_is_taken_where_it_fits_what_was_done_since():
     mission = Mission(problem(), ["area-1", "area-2"], [])
     proposal = {
-        "routes": [[{"target_id": "area-1"}, {"target_id": "area-3"}], [{"target_id": "area-2"}]],
+        "stops": [[{"target_id": "area-1"}, {"target_id": "area-3"}], [{"target_id": "area-2"}]],
         "done": 0,
     }
     mission.tell(2.5, "clock")

@@ -1,1 +1,1 @@
-"""Alembic's folder of the key table."""
+"""Alembic's folder of the tables of missions."""
