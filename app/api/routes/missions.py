@@ -151,7 +151,7 @@ async def delete_mission(mission_id: MissionId, services: Served) -> Response:
         ),
     },
 )
-async def tell_event(
+async def tell_mission_event(
     mission_id: MissionId,
     body: Annotated[EventRequest, Body(openapi_examples=EVENT_EXAMPLES)],
     services: Served,
@@ -172,7 +172,7 @@ async def tell_event(
     response_model=History,
     responses=responses("mission-not-found", "invalid-request"),
 )
-async def list_events(
+async def list_mission_events(
     mission_id: MissionId,
     services: Served,
     after: Annotated[int, Query(ge=0, le=MAX_NUMBER, description="Only events with larger numbers")] = 0,
@@ -191,7 +191,7 @@ async def list_events(
     response_model=StateAtMoment,
     responses=responses("mission-not-found", "invalid-request", "mission-busy"),
 )
-async def get_state(
+async def get_mission_state(
     mission_id: MissionId,
     services: Served,
     at: Annotated[
@@ -212,7 +212,7 @@ async def get_state(
     response_model=PlanAnswer,
     responses=responses("mission-not-found", "invalid-request"),
 )
-async def get_plan(mission_id: MissionId, services: Served) -> Response:
+async def get_mission_plan(mission_id: MissionId, services: Served) -> Response:
     """Return the rest of the plan in force, with its times by the mission's clock."""
     head = await asyncio.to_thread(services.missions.store.head, mission_id)
     return _answer({"number": head.mission.state_number, "clock": head.mission.clock, **head.plan})
@@ -236,7 +236,7 @@ async def list_proposals(mission_id: MissionId, services: Served) -> Response:
     response_model=Differences,
     responses=responses("mission-not-found", "invalid-request"),
 )
-async def get_differences(
+async def compare_mission_plans(
     mission_id: MissionId,
     services: Served,
     before: Annotated[int, Query(ge=1, le=MAX_NUMBER, description="Number of an event")],
@@ -252,7 +252,7 @@ async def get_differences(
     response_model=ReplayModel,
     responses=responses("mission-not-found", "invalid-request"),
 )
-async def get_replay(mission_id: MissionId, services: Served) -> Response:
+async def get_mission_replay(mission_id: MissionId, services: Served) -> Response:
     """Return all that is kept of a mission: each event with what it did and the state after it."""
     return await run_in_threadpool(_replay, services.missions, mission_id)
 
