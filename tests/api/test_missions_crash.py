@@ -8,10 +8,10 @@ def test_a_day_outlives_a_crash(tmp_path):
     service, reckoning = LiveService(tmp_path, workers=1, **SMALL), Reckoning()
     try:
         service.start().await_ready()
-        for seed, kills in ((1, 1), (2, 1), (0, 0), (3, 0)):
+        for seed, kills in ((1, 1), (2, 1)):
             Trial(service, seed, reckoning).run(events=20, kills=kills)
     finally:
         service.stop()
     assert reckoning.broken == []
     assert reckoning.kills == 2
-    assert reckoning.plans > 50
+    assert reckoning.plans > 30
