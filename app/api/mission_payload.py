@@ -8,10 +8,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from app.api.errors import InvalidBody
 from app.api.mission_models import MissionRequest
+from app.api.problem_details import FieldError
 from app.api.problem_models import to_problem
 from app.api.wire_fields import WireModel, from_wire
 from app.domain.errors import InvalidProblem, Violation
+from app.domain.identifiers import fault_of
 from app.domain.problem import Problem
 from app.missions import events
 from app.missions.model import Mission, Planning, Proposal
@@ -49,8 +52,16 @@ def mission_of(body: MissionRequest, settings: Settings) -> tuple[Problem, Plann
 
 
 def event_of(body: WireModel) -> tuple[events.Event, str, float | None, str]:
-    """Return the event of a request, its id, when it became known, and the digest of what was sent."""
+    """Return the event of a request, its id, when it became known, and the digest of what was sent.
+
+    Raises
+    ------
+    InvalidBody
+        If the id has a character that none may have.
+    """
     given = vars(body)
+    if (fault := fault_of(given["id"])) is not None:
+        raise InvalidBody([FieldError(pointer="/id", detail=fault)])
     event: events.Event = from_wire(body, events.TYPES[given["type"]])
     text = json.dumps(body.model_dump(mode="json", exclude_unset=True), sort_keys=True)
     return event, given["id"], given.get("at"), hashlib.sha256(text.encode()).hexdigest()

@@ -14,7 +14,6 @@ from app.missions.state import Routes, Stop
 GONE = {
     "uav_lost": "the UAV is lost",
     "area_cancelled": "the area was cancelled",
-    "done": "it was done by somebody else, or by something else than planned",
 }
 """Rules by which a stop is dropped beside those of a plan, and what they say."""
 

@@ -170,8 +170,7 @@ def settle(problem: Problem, routes: Sequence[Sequence[Stop]]) -> Settled:
     left = [list(route) for route in routes]
     broken: list[Broken] = []
     while True:
-        # Of a UAV that goes on after so many steps, the rest is left for later plans.
-        tried = with_routes(without_plan(problem), [route[: problem.max_steps] for route in left])
+        tried = with_routes(without_plan(problem), left)
         plan = Plan(tried.start_plan or ())
         try:
             return Settled(tried, timed_routes(tried, plan), tuple(broken))

@@ -43,12 +43,12 @@ class Judge:
         MissionBusy
             If the process dies again and again, or does not answer.
         """
-        if self._closed:
-            raise MissionBusy("the service is stopping")
-        if not self._started:
-            self._started = True
-            await self._executor.start(lambda: None)
         for _ in range(_TRIES):
+            if self._closed:
+                raise MissionBusy("the service is stopping")
+            if not self._started:
+                self._started = True
+                await self._executor.start(lambda: None)
             execution = self._executor.submit(
                 f"app.missions.judging:{function}", payload, time_left_s=None, on_progress=lambda _: None
             )

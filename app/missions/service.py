@@ -25,6 +25,7 @@ from app.missions.streams import MissionStreams, Told
 # Another service may write to a mission between a look at it and what follows from it; so often in a row it
 # does not.
 _TRIES = 20
+_SETTLE_S = 2.0
 
 T = TypeVar("T")
 _CLOSES = {"proposal_accepted": ProposalStatus.ACCEPTED, "proposal_refused": ProposalStatus.REFUSED}
@@ -76,12 +77,14 @@ class MissionService:
         self._streams.stop()
 
     async def stop(self) -> None:
-        """End streams, searches and the judge; what was begun to be written is written."""
+        """End streams, searches and the judge; what was judged in time is written."""
         self.begin_stop()
         if self._begun:
-            await asyncio.wait(self._begun)
+            await asyncio.wait(self._begun, timeout=_SETTLE_S)
         await self._planner.stop()
         await self._judge.close()
+        if self._begun:
+            await asyncio.wait(self._begun)
 
     async def begin(self, name: str | None, problem: Problem, planning: Planning) -> Mission:
         """Begin a mission, with the problem's ``start_plan`` in force; without one nobody flies yet.

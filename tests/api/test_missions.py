@@ -201,6 +201,8 @@ def test_fields_are_checked_as_those_of_a_problem_are(begin):
     wrong = mission.send("level_changed", target_id="area-1", level=-1.0, more=1)
     assert (wrong.status_code, wrong.json()["type"]) == (422, "invalid-request")
     assert {each["pointer"] for each in wrong.json()["errors"]} == {"/level", "/more"}
+    control = mission.send("clock", id="a\u009b")
+    assert (control.status_code, control.json()["errors"][0]["pointer"]) == (422, "/id")
     unknown = mission.send("earthquake")
     assert unknown.status_code == 422
     assert "uav_lost" in unknown.json()["detail"]

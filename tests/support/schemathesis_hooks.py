@@ -193,7 +193,7 @@ def _begun_with(body):
 
 def _state_of(case):
     """The state of the mission that an event was told to."""
-    mission = f"{case.operation.base_url}/missions/{case.path_parameters['mission_id']}"
+    mission = f"{case.operation.base_url.rstrip('/')}/missions/{case.path_parameters['mission_id']}"
     return httpx.get(mission, timeout=60).raise_for_status().json()["state"]
 
 
