@@ -29,6 +29,7 @@ PAGES = (
     "app/api/README.md",
     "app/api/plan_formats/README.md",
     "app/library/README.md",
+    "app/missions/README.md",
 )
 START_S = 300.0
 COMMAND_S = 120.0

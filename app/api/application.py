@@ -38,6 +38,7 @@ from app.api.routes import (
     examples,
     jobs,
     library,
+    missions,
     operations,
     plans,
 )
@@ -50,6 +51,9 @@ from app.jobs.local import LocalExecutor
 from app.jobs.ray_cluster import RayExecutor
 from app.jobs.service import JobService
 from app.library.seeding import seed_library
+from app.missions.judge import Judge
+from app.missions.service import MissionService
+from app.missions.store import MissionStore
 from app.settings import Settings
 from policy_store.checkpoint import ContainerLimits
 from policy_store.database import Database
@@ -67,6 +71,7 @@ _READ_HEADERS = (
 _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-Authenticate", "X-Request-ID")
 _WARM_UP = "app.allocation.warm_up:warm_up_worker"
 _WARM_UP_RESERVE = "app.allocation.warm_up:warm_up_at_once"
+_WARM_UP_JUDGE = "app.missions.judging:warm_up"
 _REQUEST_THREADS = 8
 _SEARCHES_LEAVE = 5
 """Niceness of the workers: a third of a core's time where somebody else has something to do on it."""
@@ -100,9 +105,11 @@ def create_application(settings: Settings) -> FastAPI:
             seed_library(PolicyLibrary(database), database)
             keys = KeyStore(database)
             keys.migrate()
+            mission_store = MissionStore(database)
+            mission_store.migrate()
             service = JobService(
                 database,
-                job_kinds(store, limits, settings.max_run_s, settings.max_training_s),
+                job_kinds(store, mission_store, limits, settings.max_run_s, settings.max_training_s),
                 _workers(settings, database),
                 reserve=_local(1, _WARM_UP_RESERVE, _largest(settings), settings, database),
                 max_queued={
@@ -117,15 +124,18 @@ def create_application(settings: Settings) -> FastAPI:
             )
             metrics.watch(service.load, service.waiting, store.count, database.size)
             await service.start()
+            day = _missions(mission_store, service, settings, database)
             # What is there now stays: to look through it for garbage would only hold up requests.
             gc.collect()
             gc.freeze()
             application.state.services = Services(
-                settings, database, store, service, Batches(service, BATCH), keys, metrics
+                settings, database, store, service, Batches(service, BATCH), day, keys, metrics
             )
             try:
+                await day.start()
                 yield
             finally:
+                await day.stop()
                 await service.stop(settings.jobs_grace_s)
         finally:
             database.dispose()
@@ -141,13 +151,35 @@ def create_application(settings: Settings) -> FastAPI:
         generate_unique_id_function=operation_id,
         middleware=_middleware(settings, metrics),
     )
-    for room in (allocation, evaluation, batch, algorithms, jobs, plans, library, examples, operations):
+    for room in (
+        allocation,
+        evaluation,
+        batch,
+        algorithms,
+        jobs,
+        plans,
+        missions,
+        library,
+        examples,
+        operations,
+    ):
         application.include_router(room.router)
     install_error_handlers(application)
     install_dashboard(application, settings)
     install_error_types(application)
     install_documentation(application, settings)
     return application
+
+
+def _missions(
+    store: MissionStore, jobs: JobService, settings: Settings, database: Database
+) -> MissionService:
+    """Make the missions, with a process of their own that is started when it is first needed."""
+    judge = Judge(_local(1, _WARM_UP_JUDGE, (), settings, database))
+    search = {"library_url": database.url, "threads": settings.threads_per_job}
+    sizes = ("uavs", "targets", "no_fly_zones", "zone_corners")
+    largest = {name: getattr(settings, f"max_{name}") for name in sizes}
+    return MissionService(store, jobs, judge, search, largest)
 
 
 def _workers(settings: Settings, database: Database) -> Executor:

@@ -37,6 +37,7 @@ which is the request's if it has one. A service that keys were made for needs on
 TAGS: list[dict[str, Any]] = [
     {"name": "allocation", "description": "Plans, and the algorithms that find them"},
     {"name": "jobs", "description": "What runs, ran, and waits"},
+    {"name": "missions", "description": "A day that is flown, event by event, and the plan that follows it"},
     {"name": "library", "description": "Trained source tasks that can be transferred"},
     {"name": "operations", "description": "Is it alive, is it ready"},
 ]

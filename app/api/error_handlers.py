@@ -19,6 +19,7 @@ from starlette.routing import compile_path
 
 from app.api.access.guard import route_path
 from app.api.errors import InvalidBody, RequestError
+from app.api.head_requests import streams
 from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
 from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
@@ -130,7 +131,7 @@ def _methods_at(request: Request) -> list[str]:
     path = route_path(request.scope)
     templates = [path] if path in paths else [each for each in paths if compile_path(each)[0].match(path)]
     methods = {method.upper() for template in templates for method in paths[template]}
-    if "GET" in methods and not path.endswith("/events"):
+    if "GET" in methods and not streams(path):
         methods.add("HEAD")
     return sorted(methods)
 

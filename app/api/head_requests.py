@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import re
+
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-_STREAMS = "/events"
-"""End of the paths whose answers go on as long as a job does; of these there is only GET."""
+from app.api.access.guard import route_path
+
+_STREAM = re.compile(r"/jobs/[^/]+/events|/missions/[^/]+/stream")
+
+
+def streams(path: str) -> bool:
+    """Say whether the answer of a path goes on as long as a job, or a mission, does: there is only GET."""
+    return _STREAM.fullmatch(path) is not None
 
 
 class HeadRequests:
@@ -16,7 +24,7 @@ class HeadRequests:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on."""
-        if scope["type"] != "http" or scope["method"] != "HEAD" or scope["path"].endswith(_STREAMS):
+        if scope["type"] != "http" or scope["method"] != "HEAD" or streams(route_path(scope)):
             await self._app(scope, receive, send)
             return
         # A copy: the server tells by its own that there is no body to send.

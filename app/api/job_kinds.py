@@ -11,6 +11,8 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
 from app.jobs.model import FollowUp, Job, JobKind, WorkResult
 from app.library.entries import new_policy
+from app.missions.planner import REPLAN
+from app.missions.store import MissionStore
 from policy_store.checkpoint import ContainerLimits
 from policy_store.library import PolicyLibrary
 
@@ -31,7 +33,11 @@ def _effort(payload: Mapping[str, Any]) -> float:
 
 
 def job_kinds(
-    library: PolicyLibrary, limits: ContainerLimits, max_run_s: float | None, max_training_s: float | None
+    library: PolicyLibrary,
+    missions: MissionStore,
+    limits: ContainerLimits,
+    max_run_s: float | None,
+    max_training_s: float | None,
 ) -> list[JobKind]:
     """List the kinds of job.
 
@@ -39,6 +45,8 @@ def job_kinds(
     ----------
     library
         Where policies are registered, in the transaction that ends their job.
+    missions
+        Where new plans are proposed, likewise.
     limits
         What a checkpoint may have at most.
     max_run_s, max_training_s
@@ -55,6 +63,11 @@ def job_kinds(
         policy = library.add(new_policy(job.payload["name"], task, work.artifact, limits=limits), connection)
         return {**work.result, "policy_id": policy.id}
 
+    def propose(connection: Connection, job: Job, work: WorkResult) -> Mapping[str, Any]:
+        about, proposal = job.payload, work.result["proposal"]
+        number = missions.propose(connection, about["mission_id"], about["number"], job.id, proposal)
+        return {**work.result, "mission_id": about["mission_id"], "proposal": number}
+
     return [
         JobKind(
             ALLOCATE,
@@ -67,6 +80,14 @@ def job_kinds(
         ),
         JobKind(EVALUATE, "app.allocation.evaluating:evaluate", "interactive", max_run_s=max_run_s),
         JobKind(BATCH, "app.allocation.tasks:allocate", "batch", max_run_s=max_run_s, follow_up=_REASONS),
+        JobKind(
+            REPLAN,
+            "app.missions.replanning:replan",
+            "interactive",
+            propose,
+            max_run_s=max_run_s,
+            follow_up=_REASONS,
+        ),
         JobKind(TRAIN, "app.allocation.tasks:train", "training", add_to_library, max_run_s=max_training_s),
         # The weights are the job's artifact, and the policy's.
         JobKind(

@@ -43,7 +43,10 @@ class JobErrorModel(AnswerModel):
 
 class _JobFields(AnswerModel):
     id: str = Field(description="32 hexadecimal digits")
-    kind: str = Field(description="allocate, evaluate, batch (an allocation of one), train or register")
+    kind: str = Field(
+        description="allocate, evaluate, batch (an allocation of one), train, register or replan (of a "
+        "mission)"
+    )
     status: JobStatus = Field(description="Where it is in its life")
     created_at: datetime = Field(description="When it was asked for, UTC")
     started_at: datetime | None = Field(description="When its newest attempt began, UTC")

@@ -125,6 +125,51 @@ ALLOCATION_EXAMPLES: dict[str, Example] = {
     },
 }
 
+MISSION_EXAMPLES: dict[str, Example] = {
+    "proposed": Example(
+        summary="A small problem, whose new plans are proposed",
+        value={"name": "a small town", "problem": _SMALL_TASK, "time_limit_s": 0.5},
+    )
+}
+
+EVENT_EXAMPLES: dict[str, Example] = {
+    "telemetry": Example(
+        summary="Where UAVs are",
+        value={
+            "type": "telemetry",
+            "id": "seen-1",
+            "positions": [{"uav_id": "uav-1", "time": 0.2, "x": 0.15, "y": 0.35, "dis": 0.16}],
+        },
+    ),
+    "visit_done": Example(
+        summary="A visit, with what was really unloaded",
+        value={
+            "type": "visit_done",
+            "id": "visit-1",
+            "at": 0.8,
+            "uav_id": "uav-1",
+            "target_id": "area-1",
+            "delivered": [2, 0.5],
+        },
+    ),
+    "areas_added": Example(
+        summary="Another rescue area",
+        value={
+            "type": "areas_added",
+            "id": "call-7",
+            "at": 0.8,
+            "targets": [{"id": "school", "x": 0.5, "y": 0.5, "level": 2, "loadlist": [1, 1]}],
+        },
+    ),
+    "uav_lost": Example(
+        summary="A UAV is lost", value={"type": "uav_lost", "id": "lost-2", "at": 1.1, "uav_id": "uav-2"}
+    ),
+    "proposal_accepted": Example(
+        summary="A proposal becomes the plan in force",
+        value={"type": "proposal_accepted", "id": "yes-3", "proposal": 3},
+    ),
+}
+
 ALLOCATION_ANSWER: dict[str, Any] = json.loads((_FOLDER / "answers" / "small-greedy.json").read_text("utf-8"))
 """What the greedy rule answers to the small task; a test compares."""
 

@@ -43,5 +43,7 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Let the jobs stop, and the answers that are under way come to their end."""
-        self._application.state.services.jobs.begin_stop(self._settings.jobs_grace_s)
+        services = self._application.state.services
+        services.missions.begin_stop()
+        services.jobs.begin_stop(self._settings.jobs_grace_s)
         await super().shutdown(sockets)

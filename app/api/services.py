@@ -11,6 +11,7 @@ from app.api.access.keys import KeyStore
 from app.api.batch import Batches
 from app.api.metrics import Metrics
 from app.jobs.service import JobService
+from app.missions.service import MissionService
 from app.settings import Settings
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
@@ -25,6 +26,7 @@ class Services:
     library: PolicyLibrary
     jobs: JobService
     batches: Batches
+    missions: MissionService
     keys: KeyStore
     metrics: Metrics
 

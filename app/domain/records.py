@@ -77,8 +77,9 @@ def _fields(of: type) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]
 
 
 def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    if len(names) == 1:
-        return lambda value: (getattr(value, names[0]),)
+    if len(names) < 2:
+        # Of one name it would get the value itself, and of none nothing at all.
+        return lambda value: tuple(getattr(value, name) for name in names)
     return attrgetter(*names)
 
 

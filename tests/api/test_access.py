@@ -22,6 +22,9 @@ from app.jobs.local import LocalExecutor
 from app.jobs.model import JobKind
 from app.jobs.service import JobService
 from app.jobs.store import JobStore
+from app.missions.judge import Judge
+from app.missions.service import MissionService
+from app.missions.store import MissionStore
 from app.settings import Settings
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
@@ -50,6 +53,7 @@ class Caller:
             PolicyLibrary(database),
             jobs,
             Batches(jobs, BATCH),
+            MissionService(MissionStore(database), jobs, Judge(LocalExecutor(1)), {}, {}),
             KeyStore(database),
             Metrics(),
         )

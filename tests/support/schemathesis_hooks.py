@@ -15,14 +15,16 @@ import sys
 import zlib
 from pathlib import Path
 
+import httpx
 import safetensors
 import schemathesis
 from schemathesis.core.failures import AcceptedNegativeData
 from schemathesis.generation.meta import TestPhase
-from schemathesis.openapi.checks import RejectedPositiveData, UseAfterFree
+from schemathesis.openapi.checks import EnsureResourceAvailability, RejectedPositiveData, UseAfterFree
 
 sys.path.append(str(Path(__file__).parents[2]))
 
+from mission_rules import is_refused
 from referee import Illegal, replay
 from world_rules import breaks_rules_of_the_world, has_too_many_parts
 
@@ -43,7 +45,14 @@ ONE_IN = 8
 """Routes that take a problem check it by the same model. What its fields may be is tried in full at
 `/allocate`, and one case of so many at each of the others."""
 
+LARGEST = {"uavs": 40, "targets": 50, "no_fly_zones": 200}
+"""Limits of the service in the tests, of what events add to."""
+
+STREAM = "/missions/{mission_id}/stream"
+"""It goes on as long as its mission is there, so only those of missions that are not are asked for."""
+
 _keys_sent: set[str] = set()
+_events_sent: set[tuple[str, str]] = set()
 
 
 def breaks_rules(problem):
@@ -139,8 +148,14 @@ def is_no_checkpoint(text):
 def breaks_rule_beyond_schemas(case, kind):
     """Say whether a request breaks the rule that it was refused for."""
     body = case.body
+    if kind == "event-refused":
+        return is_refused(body, _state_of(case), breaks_rules, LARGEST)
+    if kind == "event-id-reused":
+        return (case.path_parameters["mission_id"], body["id"]) in _events_sent
     problem = body if case.path in ("/allocate", "/evaluate") else body.get("task")
     asked, default = (body, "transfer_qmix") if case.path == "/allocate" else (body.get("train"), "qmix")
+    if case.path == "/missions":
+        problem, asked, default = _begun_with(body), body, "auto"
     if kind == "invalid-problem":
         rows = body.get("assignment", ()) if case.path == "/evaluate" else ()
         uneven = any(len(row) != len(body["uavs"]) for row in rows)
@@ -161,6 +176,27 @@ def breaks_rule_beyond_schemas(case, kind):
     return False
 
 
+def _begun_with(body):
+    """The problem of a mission, with what a change costs there."""
+    problem = body["problem"]
+    if body.get("change_weight") is None:
+        return problem
+    objective = problem.get("objective") or {}
+    plan = problem.get("start_plan")
+    nobody = [[len(problem["targets"])] * len(problem["uavs"])]
+    changed = {
+        "objective": {**objective, "change_weight": body["change_weight"]},
+        "start_plan": plan or nobody,
+    }
+    return {**problem, **changed}
+
+
+def _state_of(case):
+    """The state of the mission that an event was told to."""
+    mission = f"{case.operation.base_url.rstrip('/')}/missions/{case.path_parameters['mission_id']}"
+    return httpx.get(mission, timeout=60).raise_for_status().json()["state"]
+
+
 def refuses_in_its_line(response):
     """Say whether an answer to a batch refuses one of its problems: the others are answered beside it."""
     lines = map(json.loads, response.text.splitlines())
@@ -179,6 +215,8 @@ def filter_case(ctx, case):
 @schemathesis.hook
 def filter_failure(ctx, failure, case, response):
     """Keep every failure but refusals by a rule that was broken, and reading jobs that were cancelled."""
+    if isinstance(failure, EnsureResourceAvailability) and case.path == STREAM:
+        return False
     if isinstance(failure, AcceptedNegativeData) and case.path == "/allocate/batch":
         return not refuses_in_its_line(response)
     if isinstance(failure, RejectedPositiveData) and response.status_code == 422:
@@ -197,15 +235,21 @@ def after_call(ctx, case, response):
     """Remember the keys that requests came with."""
     if case.headers.get("Idempotency-Key"):
         _keys_sent.add(case.headers["Idempotency-Key"])
+    told = case.method == "POST" and case.path == "/missions/{mission_id}/events"
+    if told and response.status_code in (200, 201):
+        _events_sent.add((case.path_parameters["mission_id"], case.body["id"]))
 
 
 @schemathesis.hook
 def before_call(ctx, case, kwargs):
     """Give work milliseconds that would take minutes; what is wrong with a body stays wrong."""
+    if case.path == STREAM and re.fullmatch("[0-9a-f]{32}", case.path_parameters["mission_id"]):
+        case.path_parameters = {"mission_id": "f" * 32}
     body = case.body
     if not isinstance(body, dict):
         return
-    if case.path == "/allocate" and is_long(body.get("time_limit_s")):
+    limited = ("/allocate", "/missions")
+    if case.path in limited and is_long(body.get("time_limit_s", 1.0 if case.path == "/missions" else None)):
         case.body = {**body, "time_limit_s": LONGEST_S}
     problems = body.get("problems")
     if case.path == "/allocate/batch" and isinstance(problems, list):

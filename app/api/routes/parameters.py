@@ -9,7 +9,9 @@ from fastapi import Header, Path, Query
 from pydantic import AfterValidator
 
 from app.api.library_models import JOB_ID_PATTERN
+from app.api.mission_models import MISSION_ID_PATTERN
 from app.jobs.errors import JobNotFound
+from app.missions.errors import MissionNotFound
 from policy_store.errors import PolicyNotFound
 from policy_store.policy import ID_PATTERN as POLICY_ID_PATTERN
 
@@ -45,6 +47,12 @@ def _job_id(given: str) -> str:
     return given
 
 
+def _mission_id(given: str) -> str:
+    if not re.fullmatch(MISSION_ID_PATTERN, given):
+        raise MissionNotFound(given)
+    return given
+
+
 def _policy_id(given: str) -> str:
     if not re.fullmatch(POLICY_ID_PATTERN, given):
         raise PolicyNotFound(given)
@@ -56,6 +64,11 @@ JobId = Annotated[
     str,
     Path(description="The job", json_schema_extra={"pattern": JOB_ID_PATTERN}, examples=["0" * 32]),
     AfterValidator(_job_id),
+]
+MissionId = Annotated[
+    str,
+    Path(description="The mission", json_schema_extra={"pattern": MISSION_ID_PATTERN}, examples=["0" * 32]),
+    AfterValidator(_mission_id),
 ]
 PolicyId = Annotated[
     str,

@@ -27,6 +27,7 @@ from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request import fine_tuning
 from app.learning.universal.request.starts import policy_starts
 from app.library.entries import new_policy
+from app.missions.store import MissionStore
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers.protocol import SolverContext
@@ -209,7 +210,7 @@ def test_what_a_training_made_is_verified_before_it_is_registered(make_policy, m
             trained(how, monkeypatch, data)
     assert trained(lambda _sound: None, monkeypatch, data).artifact is None
 
-    kinds = job_kinds(library, ContainerLimits(), None, None)
+    kinds = job_kinds(library, MissionStore(library.database), ContainerLimits(), None, None)
     register = next(kind for kind in kinds if kind.name == TRAIN).on_success
 
     class Job:

@@ -1,0 +1,345 @@
+"""Missions as the rest of the program sees them: begin, tell what happens, look, listen."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
+from typing import Any, TypeVar
+from weakref import WeakValueDictionary
+
+from app.domain.errors import Violation
+from app.domain.fields import Context
+from app.domain.problem import Problem
+from app.domain.records import problem_to_record
+from app.jobs.service import JobService
+from app.missions import events
+from app.missions.effects import differences
+from app.missions.errors import EventRefused, EventReused, MissionBusy, ProposalClosed
+from app.missions.judge import Judge
+from app.missions.model import Entry, Head, Mission, Planning, Proposal, ProposalStatus
+from app.missions.planner import Planner
+from app.missions.state import MissionState, without_plan
+from app.missions.store import Judged, MissionStore, Moved, Sent, newest_of
+from app.missions.streams import MissionStreams, Told
+
+# Another service may write to a mission between a look at it and what follows from it; so often in a row it
+# does not.
+_TRIES = 20
+_SETTLE_S = 2.0
+
+T = TypeVar("T")
+_CLOSES = {"proposal_accepted": ProposalStatus.ACCEPTED, "proposal_refused": ProposalStatus.REFUSED}
+
+
+class MissionService:
+    """Missions, their events, and the search for their plans.
+
+    Parameters
+    ----------
+    store
+        The tables.
+    jobs
+        Runs the searches.
+    judge
+        Works out what events do.
+    search
+        What the payload of a search has besides: ``library_url`` and ``threads``.
+    largest
+        How many ``uavs``, ``targets``, ``no_fly_zones`` and ``zone_corners`` a problem may have.
+
+    Attributes
+    ----------
+    store
+        The tables, for those who only read.
+    """
+
+    def __init__(
+        self,
+        store: MissionStore,
+        jobs: JobService,
+        judge: Judge,
+        search: Mapping[str, Any],
+        largest: Mapping[str, int],
+    ) -> None:
+        self.store, self._judge, self._largest = store, judge, largest
+        self._streams = MissionStreams(store)
+        self._planner = Planner(store, jobs, search, self._streams.wake, self._accept)
+        self._turns: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        self._begun: set[asyncio.Task[Any]] = set()
+
+    async def start(self) -> None:
+        """Go on with the searches that an earlier process was at; the jobs have to be started before."""
+        for mission_id in await asyncio.to_thread(self.store.wanting):
+            self._planner.follow(mission_id)
+
+    def begin_stop(self) -> None:
+        """End all streams."""
+        self._streams.stop()
+
+    async def stop(self) -> None:
+        """End streams, searches and the judge; what was judged in time is written."""
+        self.begin_stop()
+        if self._begun:
+            await asyncio.wait(self._begun, timeout=_SETTLE_S)
+        await self._planner.stop()
+        await self._judge.close()
+        if self._begun:
+            await asyncio.wait(self._begun)
+
+    async def begin(self, name: str | None, problem: Problem, planning: Planning) -> Mission:
+        """Begin a mission, with the problem's ``start_plan`` in force; without one nobody flies yet.
+
+        Raises
+        ------
+        IllegalPlan
+            If that plan breaks a rule.
+        MissionBusy
+            If nobody is there to judge it.
+        """
+        if problem.start_plan is None:
+            problem = without_plan(problem)
+        record = problem_to_record(problem)
+        begun = await self._judge.ask("begin", {"problem": record})
+        state, plan = begun["state"], begun["plan"]
+        create = asyncio.to_thread(self.store.create, name, record, planning, state, plan)
+        mission = await self._whole(create)
+        self._planner.follow(mission.id)
+        return mission
+
+    async def tell(
+        self,
+        mission_id: str,
+        event: events.Event,
+        at: float | None = None,
+        *,
+        event_id: str | None = None,
+        digest: str | None = None,
+    ) -> tuple[Entry, bool]:
+        """Let something have happened; it is on disk with what it does when this returns.
+
+        Parameters
+        ----------
+        mission_id
+            The mission.
+        event
+            What has happened.
+        at
+            When that became known, by the mission's clock; None: at its clock, or when a UAV was seen last.
+        event_id, digest
+            Of the client, and of all that must not differ where the id comes again.
+
+        Returns
+        -------
+        tuple
+            The event as it is kept, and whether it is new: an id that was seen before with the same digest
+            gives what came of it the first time.
+
+        Raises
+        ------
+        MissionNotFound, EventReused
+            If there is no such mission, or the event's id came with another one.
+        EventRefused, ProposalClosed
+            If the event is from the past, about something unknown, or impossible; or its proposal is closed.
+        MissionBusy
+            If nobody is there to judge it, or others change the mission all the time.
+        """
+        return await self._whole(self._tell(mission_id, event, at, event_id, digest))
+
+    async def _tell(
+        self,
+        mission_id: str,
+        event: events.Event,
+        at: float | None,
+        event_id: str | None,
+        digest: str | None,
+    ) -> tuple[Entry, bool]:
+        lock = self._turns.setdefault(mission_id, asyncio.Lock())
+        async with lock:
+            for _ in range(_TRIES):
+                head = await asyncio.to_thread(self.store.head, mission_id)
+                if event_id is not None and (known := await self._known(mission_id, event_id, digest)):
+                    return known, False
+                try:
+                    if isinstance(event, events.Telemetry):
+                        entry, new = await self._see(head, event, event_id, digest)
+                    else:
+                        entry, new = await self._judged(head, event, at, event_id, digest)
+                except Moved:
+                    continue
+                if new:
+                    self._streams.tell(mission_id, entry)
+                return entry, new
+        raise MissionBusy(f"mission {mission_id!r} is changed by others all the time; try again")
+
+    async def _known(self, mission_id: str, event_id: str, digest: str | None) -> Entry | None:
+        known = await asyncio.to_thread(self.store.known, mission_id, event_id)
+        if known is not None and known[1] != digest:
+            raise EventReused(event_id, known[0].number)
+        return None if known is None else known[0]
+
+    async def _see(
+        self, head: Head, event: events.Telemetry, event_id: str | None, digest: str | None
+    ) -> tuple[Entry, bool]:
+        """Keep positions; what they mean is worked out with the next event of another type."""
+        _require_known(head, event)
+        body = events.event_to_record(event)
+        newest = newest_of(body["positions"])
+        at = max(each["time"] for each in newest.values())
+        sent = Sent(event_id, digest, body["type"], at, body)
+        return await asyncio.to_thread(self.store.commit_positions, head.mission.id, sent, newest)
+
+    async def _judged(
+        self, head: Head, event: events.Event, at: float | None, event_id: str | None, digest: str | None
+    ) -> tuple[Entry, bool]:
+        seen = head.new_positions
+        if at is None:
+            at = max([head.mission.clock, *(each["time"] for each in seen.values())])
+        self._require_sizes(head, event)
+        proposal = await self._proposal_of(head.mission.id, event)
+        body = events.event_to_record(event)
+        payload = {
+            "state": head.state,
+            "matrices": head.matrices,
+            "event": body,
+            "at": at,
+            "positions": seen,
+            "proposal": None if proposal is None else proposal.content,
+        }
+        after = await self._judge.ask("apply", payload)
+        closes = None if proposal is None else (proposal.number, _CLOSES[body["type"]])
+        judged = Judged(after["state"], after["plan"], after["effect"], after["wants_plan"], closes)
+        sent = Sent(event_id, digest, body["type"], at, body)
+        entry, new = await asyncio.to_thread(
+            self.store.commit, head.mission.id, head.mission.last_number, sent, judged
+        )
+        if judged.wants_plan and new:
+            self._planner.follow(head.mission.id)
+        return entry, new
+
+    def _require_sizes(self, head: Head, event: events.Event) -> None:
+        """Refuse what would make the problem larger than is taken."""
+        problem = head.state["problem"]
+        added: dict[str, int] = {}
+        if isinstance(event, events.UavsAdded):
+            added["uavs"] = len(problem["uavs"]) + len(event.uavs)
+        elif isinstance(event, events.AreasAdded):
+            added["targets"] = len(problem["targets"]) + len(event.targets)
+        elif isinstance(event, events.ZonesChanged):
+            added["no_fly_zones"] = len(event.no_fly_zones)
+            added["zone_corners"] = sum(len(zone.polygon) for zone in event.no_fly_zones)
+        for name, size in added.items():
+            if size > self._largest[name]:
+                pointer = "/no_fly_zones" if name == "zone_corners" else f"/{name}"
+                what = name.replace("_", " ")
+                detail = f"{size} {what} with those there are, at most {self._largest[name]} are taken"
+                raise EventRefused.at(pointer, detail)
+
+    async def _proposal_of(self, mission_id: str, event: events.Event) -> Proposal | None:
+        """Return the proposal that an event is about, which has to be open."""
+        if not isinstance(event, events.ProposalAccepted | events.ProposalRefused):
+            return None
+        proposal = await asyncio.to_thread(self.store.proposal, mission_id, event.proposal)
+        if proposal is None:
+            detail = f"{event.proposal} is no number of a proposal of this mission"
+            raise EventRefused.at("/proposal", detail)
+        if proposal.status is not ProposalStatus.OPEN:
+            raise ProposalClosed(f"proposal {event.proposal} is {proposal.status}")
+        return proposal
+
+    async def _accept(self, mission_id: str) -> None:
+        """Let the open proposal of a mission take effect; one that fits no more is outdated."""
+        for proposal in await asyncio.to_thread(self.store.proposals, mission_id):
+            if proposal.status is ProposalStatus.OPEN:
+                try:
+                    await self.tell(mission_id, events.ProposalAccepted(proposal.number))
+                except ProposalClosed:
+                    await asyncio.to_thread(self.store.outdate, mission_id, proposal.number)
+                return
+
+    async def delete(self, mission_id: str) -> None:
+        """Delete a mission with all that is kept of it.
+
+        Raises
+        ------
+        MissionNotFound
+            If there is none of that id.
+        """
+        await asyncio.to_thread(self.store.delete, mission_id)
+        self._streams.wake(mission_id)
+
+    async def look(self, mission_id: str, at: float | None) -> tuple[int, Mapping[str, Any]]:
+        """Return the state of a mission at a moment: as it was, or as it is planned to be.
+
+        Parameters
+        ----------
+        mission_id
+            The mission.
+        at
+            By its clock; None: now.
+
+        Returns
+        -------
+        tuple
+            Number of the event that it follows from, and ``state`` and ``plan``.
+
+        Raises
+        ------
+        MissionNotFound, MissionBusy
+            If there is no such mission, or nobody is there to work it out.
+        """
+        head = await asyncio.to_thread(self.store.head, mission_id)
+        if at is None or at == head.mission.clock:
+            return head.mission.state_number, {"state": head.state, "plan": head.plan}
+        number, state, seen = head.mission.state_number, head.state, head.new_positions
+        if at < head.mission.clock:
+            number, state = await asyncio.to_thread(self.store.state_at, mission_id, at)
+            seen = {}
+        payload = {"state": state, "matrices": head.matrices, "at": at, "positions": seen}
+        return number, await self._judge.ask("look", payload)
+
+    async def differences(self, mission_id: str, before: int, after: int) -> dict[str, Any]:
+        """Return how the plans differ that were in force after two events, see :mod:`app.missions.effects`.
+
+        Raises
+        ------
+        MissionNotFound
+            If there is no such mission.
+        """
+        records = [
+            (await asyncio.to_thread(self.store.state_after, mission_id, number))[1]
+            for number in (before, after)
+        ]
+        head = await asyncio.to_thread(self.store.head, mission_id)
+        states = [MissionState.from_record(record, head.matrices) for record in records]
+        uav_ids = [uav.id for uav in states[-1].problem.uavs]
+        return differences(uav_ids, states[0].routes, states[1].routes)
+
+    def listen(
+        self, mission_id: str, after: int, allowed: Callable[[], Awaitable[bool]] | None = None
+    ) -> AsyncGenerator[Told]:
+        """Listen to a mission, see :meth:`app.missions.streams.MissionStreams.listen`."""
+        return self._streams.listen(mission_id, after, allowed)
+
+    async def _whole(self, work: Coroutine[Any, Any, T]) -> T:
+        """Do something to its end, also if the caller is cancelled."""
+        task = asyncio.create_task(work)
+        self._begun.add(task)
+        task.add_done_callback(self._begun.discard)
+        return await asyncio.shield(task)
+
+
+def _require_known(head: Head, event: events.Telemetry) -> None:
+    """Refuse positions of UAVs that are not known, and those that no problem of this kind has."""
+    problem = head.state["problem"]
+    uav_ids = {uav["id"] for uav in problem["uavs"]}
+    rows = 0 if head.matrices is None else len(next(iter(head.matrices.values()))["distance"])
+    violations = list(events.broken_rules(event, Context(problem["crs"], None)))
+    for k, each in enumerate(event.positions):
+        if each.uav_id not in uav_ids:
+            detail = f"{each.uav_id!r} is no UAV of this mission, which has {len(uav_ids)}"
+            violations.append(Violation(f"/positions/{k}/uav_id", detail))
+        if each.location is not None and each.location >= rows:
+            detail = f"{each.location} is no row of the matrices, which have {rows}"
+            violations.append(Violation(f"/positions/{k}/location", detail))
+    if violations:
+        raise EventRefused.of(violations)
