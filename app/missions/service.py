@@ -7,8 +7,6 @@ from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapp
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
-from app.domain.errors import Violation
-from app.domain.fields import Context
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
 from app.jobs.service import JobService
@@ -18,6 +16,7 @@ from app.missions.errors import EventRefused, EventReused, MissionBusy, Proposal
 from app.missions.judge import Judge
 from app.missions.model import Entry, Head, Mission, Planning, Proposal, ProposalStatus
 from app.missions.planner import Planner
+from app.missions.position_check import PositionCheck
 from app.missions.state import MissionState, without_plan
 from app.missions.store import Judged, MissionStore, Moved, Sent, newest_of
 from app.missions.streams import MissionStreams, Told
@@ -26,6 +25,7 @@ from app.missions.streams import MissionStreams, Told
 # does not.
 _TRIES = 20
 _SETTLE_S = 2.0
+_CHECKS = 100
 
 T = TypeVar("T")
 _CLOSES = {"proposal_accepted": ProposalStatus.ACCEPTED, "proposal_refused": ProposalStatus.REFUSED}
@@ -64,6 +64,8 @@ class MissionService:
         self.store, self._judge, self._largest = store, judge, largest
         self._streams = MissionStreams(store)
         self._planner = Planner(store, jobs, search, self._streams.wake, self._accept)
+        # Of the missions whose UAVs were seen last; thrown away at any moment.
+        self._checks: dict[str, PositionCheck] = {}
         self._turns: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._begun: set[asyncio.Task[Any]] = set()
 
@@ -156,15 +158,13 @@ class MissionService:
         lock = self._turns.setdefault(mission_id, asyncio.Lock())
         async with lock:
             for _ in range(_TRIES):
-                head = await asyncio.to_thread(self.store.head, mission_id)
-                if event_id is not None and (known := await self._known(mission_id, event_id, digest)):
-                    return known, False
                 try:
                     if isinstance(event, events.Telemetry):
-                        entry, new = await self._see(head, event, event_id, digest)
+                        entry, new = await self._see(mission_id, event, event_id, digest)
                     else:
-                        entry, new = await self._judged(head, event, at, event_id, digest)
+                        entry, new = await self._judged(mission_id, event, at, event_id, digest)
                 except Moved:
+                    self._checks.pop(mission_id, None)
                     continue
                 if new:
                     self._streams.tell(mission_id, entry)
@@ -178,19 +178,36 @@ class MissionService:
         return None if known is None else known[0]
 
     async def _see(
-        self, head: Head, event: events.Telemetry, event_id: str | None, digest: str | None
+        self, mission_id: str, event: events.Telemetry, event_id: str | None, digest: str | None
     ) -> tuple[Entry, bool]:
         """Keep positions; what they mean is worked out with the next event of another type."""
-        _require_known(head, event)
+        check = self._checks.pop(mission_id, None)
+        # What is not taken by the state that is remembered may be by a newer one.
+        if check is None or check.violations(event):
+            check = PositionCheck.of(await asyncio.to_thread(self.store.head, mission_id))
+        if violations := check.violations(event):
+            raise EventRefused.of(violations)
+        self._checks[mission_id] = check
+        if len(self._checks) > _CHECKS:
+            del self._checks[next(iter(self._checks))]
         body = events.event_to_record(event)
         newest = newest_of(body["positions"])
         at = max(each["time"] for each in newest.values())
         sent = Sent(event_id, digest, body["type"], at, body)
-        return await asyncio.to_thread(self.store.commit_positions, head.mission.id, sent, newest)
+        commit = self.store.commit_positions
+        return await asyncio.to_thread(commit, mission_id, check.state_number, sent, newest)
 
     async def _judged(
-        self, head: Head, event: events.Event, at: float | None, event_id: str | None, digest: str | None
+        self,
+        mission_id: str,
+        event: events.Event,
+        at: float | None,
+        event_id: str | None,
+        digest: str | None,
     ) -> tuple[Entry, bool]:
+        head = await asyncio.to_thread(self.store.head, mission_id)
+        if event_id is not None and (known := await self._known(mission_id, event_id, digest)):
+            return known, False
         seen = head.new_positions
         if at is None:
             at = max([head.mission.clock, *(each["time"] for each in seen.values())])
@@ -326,20 +343,3 @@ class MissionService:
         self._begun.add(task)
         task.add_done_callback(self._begun.discard)
         return await asyncio.shield(task)
-
-
-def _require_known(head: Head, event: events.Telemetry) -> None:
-    """Refuse positions of UAVs that are not known, and those that no problem of this kind has."""
-    problem = head.state["problem"]
-    uav_ids = {uav["id"] for uav in problem["uavs"]}
-    rows = 0 if head.matrices is None else len(next(iter(head.matrices.values()))["distance"])
-    violations = list(events.broken_rules(event, Context(problem["crs"], None)))
-    for k, each in enumerate(event.positions):
-        if each.uav_id not in uav_ids:
-            detail = f"{each.uav_id!r} is no UAV of this mission, which has {len(uav_ids)}"
-            violations.append(Violation(f"/positions/{k}/uav_id", detail))
-        if each.location is not None and each.location >= rows:
-            detail = f"{each.location} is no row of the matrices, which have {rows}"
-            violations.append(Violation(f"/positions/{k}/location", detail))
-    if violations:
-        raise EventRefused.of(violations)

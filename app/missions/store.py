@@ -185,7 +185,7 @@ class MissionStore(MissionQueries):
             return entry, True
 
     def commit_positions(
-        self, mission_id: str, sent: Sent, newest: Mapping[str, Mapping[str, Any]]
+        self, mission_id: str, state_number: int, sent: Sent, newest: Mapping[str, Mapping[str, Any]]
     ) -> tuple[Entry, bool]:
         """Keep a batch of positions, of which those count that are newer than what is known of their UAV.
 
@@ -193,6 +193,8 @@ class MissionStore(MissionQueries):
         ----------
         mission_id
             The mission.
+        state_number
+            Of the state by which they were checked.
         sent
             The event.
         newest
@@ -207,11 +209,15 @@ class MissionStore(MissionQueries):
         ------
         MissionNotFound, EventReused
             As :meth:`commit` does.
+        Moved
+            If there is another state.
         """
         with self.database.write() as connection:
             row = self._locked(connection, mission_id)
             if (known := _known(connection, mission_id, sent)) is not None:
                 return known, False
+            if row["state_number"] != state_number:
+                raise Moved
             of = positions.c.mission_id == mission_id, positions.c.uav_id.in_(list(newest))
             times = dict(connection.execute(sa.select(positions.c.uav_id, positions.c.time).where(*of)).all())
             kept = {uav_id: each for uav_id, each in newest.items() if each["time"] > times.get(uav_id, -1.0)}

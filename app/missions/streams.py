@@ -35,10 +35,19 @@ class Told:
 
 
 class _Growth:
-    """The newest events of one mission, as long as somebody listens."""
+    """The newest events of one mission, as long as somebody listens.
+
+    Attributes
+    ----------
+    changed
+        Set at the next change, and then replaced: take it before looking, wait for it after.
+    looks
+        How often somebody said that there may be more in the table than is remembered.
+    """
 
     def __init__(self) -> None:
         self.changed = asyncio.Event()
+        self.looks = 0
         self._newest: deque[Told] = deque(maxlen=_REMEMBERED)
 
     def add(self, told: Told) -> None:
@@ -46,10 +55,14 @@ class _Growth:
         if self._newest and told.number != self._newest[-1].number + 1:
             self._newest.clear()
         self._newest.append(told)
-        self.wake()
+        self._wake()
 
     def wake(self) -> None:
-        """Let everybody look again."""
+        """Let everybody look at the table."""
+        self.looks += 1
+        self._wake()
+
+    def _wake(self) -> None:
         self.changed.set()
         self.changed = asyncio.Event()
 
@@ -115,10 +128,12 @@ class MissionStreams:
         growth = self._growing.get(mission_id)
         if growth is None:
             growth = self._growing[mission_id] = _Growth()
+        due, looked = True, growth.looks
         while True:
-            changed = growth.changed
+            changed, looks = growth.changed, growth.looks
             news = growth.since(after)
-            if not news:
+            if news is None or (not news and (due or looks != looked)):
+                due, looked = False, looks
                 entries = await asyncio.to_thread(self._store.entries, mission_id, after, _READ_AT_ONCE)
                 news = [Told.of(entry) for entry in entries]
             if allowed is not None and not await allowed():
@@ -130,3 +145,4 @@ class MissionStreams:
                 return
             if not news:
                 await wait_for(changed, self._look_again_s)
+                due = not changed.is_set()

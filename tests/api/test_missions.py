@@ -228,6 +228,15 @@ def test_positions_count_with_the_next_event(begin):
     assert mission.get()["state"]["problem"]["uavs"][0]["x_c"] == 0.5
 
 
+def test_positions_of_a_uav_that_is_new_are_taken(begin):
+    mission = begin(problem=PLANNED)
+    new = {**SMALL["uavs"][0], "id": "new"}
+    seen = {"time": 1.0, "x": 0.0, "y": 0.0}
+    mission.tell("telemetry", positions=[{**seen, "uav_id": "uav-1"}])
+    mission.tell("uavs_added", uavs=[new])
+    assert mission.tell("telemetry", positions=[{**seen, "uav_id": "new"}])["passed_over"] == 0
+
+
 def test_the_state_is_known_at_every_moment(begin):
     mission = begin(problem=PLANNED)
     mission.tell("clock", 1.0)

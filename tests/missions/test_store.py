@@ -89,7 +89,7 @@ def test_positions_make_no_state_and_newer_ones_count(store, mission):
 
     def see(event_id, batch):
         event = sent(event_id, type_="telemetry", positions=batch)
-        return store.commit_positions(mission, event, newest_of(batch))
+        return store.commit_positions(mission, 1, event, newest_of(batch))
 
     first, _ = see("a", seen(1.0, 3.0, 2.0))
     assert (first.number, first.outcome) == (2, {"passed_over": 2})
@@ -102,6 +102,8 @@ def test_positions_make_no_state_and_newer_ones_count(store, mission):
     head = store.head(mission)
     assert head.new_positions == {}
     assert head.positions["uav-1"]["number"] == 2
+    with pytest.raises(Moved):
+        see("d", seen(9.0))
     assert store.states(mission).keys() == {1, 4}
 
 
