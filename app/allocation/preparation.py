@@ -33,6 +33,7 @@ class Preparations:
     def __init__(self) -> None:
         self._trials: list[_Measured] = []
         self._last: dict[tuple[str, str, int, int, int], float] = {}
+        self._once: dict[tuple[str, str, int, int, int], float] = {}
 
     def tried(self, algorithm: str, problem: Problem, seconds: float) -> None:
         """Note how long an algorithm took that was told to stop from the beginning."""
@@ -41,9 +42,22 @@ class Preparations:
         )
 
     def took(self, algorithm: str, problem: Problem, seconds: float) -> None:
-        """Note how long an algorithm took that got no further than its preparations in its time."""
+        """Note how long an algorithm took that got no further than its preparations in its time.
+
+        Once is an accident, as on a busy machine or where code was loaded: it counts where it happens twice
+        running.
+        """
         at = _magnitude(algorithm, problem)
-        self._last[at] = (self._last.get(at, seconds) + seconds) / 2
+        if at in self._last:
+            self._last[at] = (self._last[at] + seconds) / 2
+        elif at in self._once:
+            self._last[at] = min(self._once.pop(at), seconds)
+        else:
+            self._once[at] = seconds
+
+    def ended_in_time(self, algorithm: str, problem: Problem) -> None:
+        """Note that an algorithm got further than its preparations in its time."""
+        self._once.pop(_magnitude(algorithm, problem), None)
 
     def expected(self, algorithm: str, problem: Problem) -> float:
         """Return the seconds that an algorithm needs before it can be stopped."""

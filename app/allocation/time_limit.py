@@ -102,7 +102,9 @@ class TimeLimit:
         late = max(0.0, -left)
         if late > _PREPARING_SHARE * self._begun_with:
             self._times.preparations.took(what, self._problem, self._begun_with + late)
-        elif late > 0:
+            return
+        self._times.preparations.ended_in_time(what, self._problem)
+        if late > 0:
             self._times.stopped(what, self._problem, late)
 
     def hurries(self) -> bool:

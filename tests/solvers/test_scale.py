@@ -8,6 +8,8 @@ import pytest
 from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
+from app.solvers.local_search.annealing import new_search, set_routes
+from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.scale import common_level, largest_level
@@ -75,3 +77,33 @@ def test_one_level_that_stands_out_is_not_the_common_one():
     nothing = [replace(target, level=0.0) for target in targets]
     arrays = compile_problem(replace(problem, targets=tuple(nothing)))
     assert largest_level(arrays) == common_level(arrays) == 1.0
+
+
+def test_temperatures_follow_what_visits_earn_not_what_areas_are_worth():
+    """Loads of a hundredth of every need, and one visit that earns much more than the others."""
+    problem = generate("uniform", 6, 12, 2, np.random.default_rng(5))
+    targets = tuple(replace(t, level=1.0, loadlist=(200.0, 200.0)) for t in problem.targets)
+    uavs = tuple(replace(uav, loadlist=(2.0, 2.0), voyage=9.0) for uav in problem.uavs)
+    arrays = compile_problem(replace(problem, targets=targets, uavs=uavs))
+    search = new_search(arrays)
+    assert gains(arrays, search.routes) == (largest_level(arrays), common_level(arrays))
+    set_routes(search, np.array([[0, 1, 2, 3, 4, 5]]))
+    assert gains(arrays, search.routes) == pytest.approx((0.01, 0.01))
+    targets = (replace(targets[0], level=100.0), *targets[1:])
+    arrays = compile_problem(replace(problem, targets=targets, uavs=uavs))
+    search = new_search(arrays)
+    set_routes(search, np.array([[0, 1, 2, 3, 4, 5]]))
+    largest, common = gains(arrays, search.routes)
+    assert largest == pytest.approx(1.0)
+    assert 0.01 < common < 0.1
+
+
+def test_a_search_ends_where_distances_are_decided_on():
+    problem = generate("uniform", 4, 30, 2, np.random.default_rng(5))
+    arrays = compile_problem(in_unit(problem, 1.0, 0.5))
+    leg = neighbour_leg(arrays, new_search(arrays).near)
+    assert 0.05 < leg < 0.3
+    assert coldest_by_distance(arrays, leg, 5.0) == pytest.approx(0.01 * leg)
+    assert coldest_by_distance(arrays, leg, 1e-6) == 1e-6
+    free = compile_problem(in_unit(problem, 1.0, 0.0))
+    assert coldest_by_distance(free, leg, 5.0) == 5.0

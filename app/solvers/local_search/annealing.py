@@ -25,7 +25,8 @@ from app.solvers.local_search.change import (
 from app.solvers.local_search.flights import is_reload
 from app.solvers.local_search.moves import draw_move
 from app.solvers.local_search.neighbourhood import Neighbourhood, neighbourhood
-from app.solvers.local_search.rebuild import Rebuilding, new_rebuilding, rebuild
+from app.solvers.local_search.placing import Placing, new_placing
+from app.solvers.local_search.rebuild import rebuild
 from app.solvers.local_search.routes import (
     CLOSING,
     DISTANCE,
@@ -57,6 +58,8 @@ class Search(NamedTuple):
         What no plan's satisfaction exceeds.
     pool
         Where routes are collected, if they are.
+    placing
+        Scratch space of large moves.
     """
 
     arrays: ProblemArrays
@@ -68,7 +71,7 @@ class Search(NamedTuple):
     best: Floats
     most: float
     pool: Pool
-    rebuilding: Rebuilding
+    placing: Placing
 
 
 def new_search(arrays: ProblemArrays) -> Search:
@@ -99,7 +102,7 @@ def _begin(arrays: ProblemArrays, near: Neighbourhood, most: float, pool: Pool) 
         best,
         most,
         pool,
-        new_rebuilding(arrays),
+        new_placing(arrays),
     )
 
 
@@ -253,7 +256,7 @@ def draw_change(search: Search, rng: np.random.Generator, large: float) -> bool:
     """Propose a random change that rule 2 allows, of a large move with a probability; False where none is."""
     arrays, routes, near, change = search.arrays, search.routes, search.near, search.change
     if large > 0.0 and rng.random() < large:
-        return rebuild(arrays, routes, near, change, search.rebuilding, rng)
+        return rebuild(arrays, routes, near, change, search.placing, rng)
     return draw_move(arrays, routes, near, change, rng) and feasible(arrays, change)
 
 
