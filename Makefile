@@ -37,6 +37,7 @@ bench: .venv/development
 	$(BIN)/python tests/benchmarks/bench_training.py
 	$(BIN)/python tests/benchmarks/bench_local_search.py
 	$(BIN)/python tests/benchmarks/bench_crash.py --quick
+	$(BIN)/python tests/benchmarks/bench_missions.py days --quick
 	$(BIN)/python tests/benchmarks/bench_load.py --quick
 	$(BIN)/python tests/benchmarks/bench_mutations.py --quick
 	$(BIN)/python tests/benchmarks/bench_slow_senders.py

@@ -51,7 +51,10 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--listeners", type=int, default=20)
     parser.add_argument("--limit", type=float, default=0.5)
+    parser.add_argument("--quick", action="store_true", help="two days of twenty events; ten seconds")
     given = parser.parse_args()
+    if given.quick:
+        given.days, given.events, given.seconds = 2, 20, 10.0
     with tempfile.TemporaryDirectory() as folder:
         service = LiveService(Path(folder), workers=1, **SMALL).start().await_ready()
         try:
