@@ -66,7 +66,18 @@ class Mission:
 
 @pytest.fixture
 def begin(client):
-    return lambda **body: Mission(client, **body)
+    """Begins missions, and leaves none behind whose plan is still being looked for."""
+    begun = []
+
+    def begin(**body):
+        begun.append(Mission(client, **body))
+        return begun[-1]
+
+    yield begin
+    for mission in begun:
+        if client.get(mission.path).is_success:
+            mission.settle()
+            client.delete(mission.path)
 
 
 def test_a_plan_is_proposed_and_accepted(begin):
