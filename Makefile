@@ -3,8 +3,8 @@ PORT ?= 8000
 HOST ?= 127.0.0.1
 PYTHON ?= python3
 BIN := .venv/bin
-# Groups of test files at a time: one more than two cores can do, because tests wait for processes.
-PROCESSES ?= 3
+# Groups of test files at a time.
+PROCESSES ?= 2
 
 .PHONY: run test lint types borders unit bench constraints clean
 

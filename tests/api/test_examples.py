@@ -227,7 +227,7 @@ def test_every_uav_flies_several_times_and_takes_what_is_in_stock(floods):
         flights.append(sum(kind == "visit" and before != kind for before, kind in pairwise(["", *kinds])))
         loaded += sum(np.array(stop["loaded"]) for stop in route["stops"] if stop["kind"] == "reload")
         assert route["landing"]["time"] <= 3.5
-    assert set(flights) == {3, 4}
+    assert (sum(flights), min(flights), max(flights)) == (20, 3, 5)
     assert sum(flights) == 20
     assert np.array(base.stock) - loaded == pytest.approx(answer["bases"][0]["stock"])
 
