@@ -86,7 +86,8 @@ def test_stopping_keeps_the_best_plan(page):
     page.locator("#view-compare button[type=submit]").click()
     expect(page.get_by_test_id("compare-time").locator("canvas")).to_have_count(1)
 
-    page.locator("#view-compare").get_by_role("button", name="Stop").click()
+    # While the search keeps all cores busy, the browser may not draw two frames in a row for a minute.
+    page.locator("#view-compare").get_by_role("button", name="Stop").click(force=True)
 
     expect(page.get_by_test_id("compare-status")).to_have_text("1 of 1 algorithms have a plan.")
     expect(page.locator("#view-compare article.plan")).to_have_count(1)
