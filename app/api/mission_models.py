@@ -117,7 +117,9 @@ class MissionModel(AnswerModel):
     clock: float = Field(description="The mission's clock: that of the newest event that made a state")
     last_number: int = Field(description="Number of the newest event")
     state_number: int = Field(description="Number of the newest event that made a state")
-    searching: bool = Field(description="Whether a plan is being looked for, or soon will be")
+    searching: bool = Field(
+        description="Whether a plan is looked for, or soon will be, or is about to take effect"
+    )
     planning: PlanningModel = Field(description="How it is planned")
     trouble: JobErrorModel | None = Field(description="Why the newest search failed, if it did")
     created_at: datetime = Field(description="When it was begun, UTC")

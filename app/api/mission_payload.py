@@ -76,7 +76,7 @@ def mission_answer(mission: Mission) -> dict[str, Any]:
         "clock": mission.clock,
         "last_number": mission.last_number,
         "state_number": mission.state_number,
-        "searching": mission.wants_plan,
+        "searching": mission.is_searching,
         "planning": mission.planning.to_record(),
         "trouble": None
         if trouble is None

@@ -106,7 +106,7 @@ class Draft:
             raise EventRefused.of([_in_event(violation, pointer) for violation in error.violations]) from None
 
     def take(self, routes: Sequence[Sequence[Stop]]) -> None:
-        """Take other routes; who is called home from a visit is not committed to it any more."""
+        """Take other routes; a UAV that is called home from a visit is not committed to it any more."""
         for i, (before, now) in enumerate(zip(self.routes, routes, strict=True)):
             left = set() if now else {stop.id for stop in before if not stop.is_base}
             committed = self.problem.uavs[i].committed

@@ -1,6 +1,6 @@
 """Asks a worker process of its own about missions, so that no search keeps an event waiting.
 
-The process is started when it is first needed: who has no missions does without it.
+The process is started when it is first needed: a service without missions has none.
 """
 
 from __future__ import annotations

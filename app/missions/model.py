@@ -53,6 +53,8 @@ class Mission:
         Of the newest event, and of the newest one that made a state.
     wanted, planned
         The newest event after which another plan may be better, and that up to which plans were looked for.
+    has_open
+        Whether a proposal is open.
     planning
         How it is planned.
     trouble
@@ -68,6 +70,7 @@ class Mission:
     state_number: int
     wanted: int
     planned: int
+    has_open: bool
     planning: Planning
     trouble: Mapping[str, Any] | None
     created_at: datetime
@@ -76,6 +79,11 @@ class Mission:
     def wants_plan(self) -> bool:
         """Whether a plan is to be looked for, or is being."""
         return self.wanted > self.planned
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether another plan may soon be proposed, or take effect by itself."""
+        return self.wants_plan or (self.has_open and self.planning.plans == "automatic")
 
 
 @dataclass(frozen=True, slots=True)

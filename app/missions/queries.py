@@ -1,4 +1,4 @@
-"""Looking at the tables of missions; nothing here changes them, or waits for one who does.
+"""Looking at the tables of missions; nothing here changes them, or waits for what does.
 
 The methods block on the disk: call them from a thread, not from an event loop.
 """
@@ -21,7 +21,12 @@ from app.missions.model import Entry, Head, Mission, Planning, Proposal, Proposa
 from app.missions.tables import events, missions, positions, proposals, states
 
 _LARGE = {"number", "problem", "matrices"}
-select_missions = sa.select(*(column for column in missions.c if column.name not in _LARGE))
+_has_open = sa.exists().where(
+    proposals.c.mission_id == missions.c.id, proposals.c.status == ProposalStatus.OPEN
+)
+select_missions = sa.select(
+    *(column for column in missions.c if column.name not in _LARGE), _has_open.label("has_open")
+)
 select_entries = sa.select(*(column for column in events.c if column.name != "state"))
 _MOST_DIGITS = 18
 
@@ -86,10 +91,7 @@ class MissionQueries:
 
     def wanting(self) -> list[str]:
         """Return the ids of the missions for which a plan is to be looked for, or accepted."""
-        is_open = sa.exists().where(
-            proposals.c.mission_id == missions.c.id, proposals.c.status == ProposalStatus.OPEN
-        )
-        wants = sa.or_(missions.c.wanted > missions.c.planned, is_open)
+        wants = sa.or_(missions.c.wanted > missions.c.planned, _has_open)
         with self.database.read() as connection:
             return list(connection.scalars(sa.select(missions.c.id).where(wants)))
 
@@ -195,6 +197,7 @@ def mission_of(row: RowMapping) -> Mission:
         **given,
         wanted=row["wanted"],
         planned=row["planned"],
+        has_open=row["has_open"],
         planning=Planning(**row["planning"]),
         created_at=datetime.fromtimestamp(row["created_at"], UTC),
     )

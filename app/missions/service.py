@@ -50,7 +50,7 @@ class MissionService:
     Attributes
     ----------
     store
-        The tables, for those who only read.
+        The tables, for what only reads.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class MissionService:
         IllegalPlan
             If that plan breaks a rule.
         MissionBusy
-            If nobody is there to judge it.
+            If the judge does not answer.
         """
         if problem.start_plan is None:
             problem = without_plan(problem)
@@ -143,7 +143,7 @@ class MissionService:
         EventRefused, ProposalClosed
             If the event is from the past, about something unknown, or impossible; or its proposal is closed.
         MissionBusy
-            If nobody is there to judge it, or others change the mission all the time.
+            If the judge does not answer, or the mission changes each time before it has.
         """
         return await self._whole(self._tell(mission_id, event, at, event_id, digest))
 
@@ -302,7 +302,7 @@ class MissionService:
         Raises
         ------
         MissionNotFound, MissionBusy
-            If there is no such mission, or nobody is there to work it out.
+            If there is no such mission, or the judge does not answer.
         """
         head = await asyncio.to_thread(self.store.head, mission_id)
         if at is None or at == head.mission.clock:

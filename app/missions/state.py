@@ -42,7 +42,7 @@ class Stop:
 
 
 Routes = tuple[tuple[Stop, ...], ...]
-"""The stops of each UAV, in the order of the problem's UAVs; who has none flies home, or stays there."""
+"""The stops of each UAV, in the order of the problem's UAVs; with none it flies home, or stays there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Writing to the tables of missions: an event and the state that it makes are one transaction.
 
-Who writes names the number of the newest event that is known to it, and nothing is written if there is a
-newer one: so events take effect one after the other, whoever else writes. The methods block on the disk.
+A write names the newest event that is known to it, and nothing is written if there is a
+newer one: so events take effect one after the other, from whatever process. The methods block on the disk.
 """
 
 from __future__ import annotations

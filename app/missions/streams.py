@@ -1,4 +1,4 @@
-"""The history of missions as it grows, told to everybody in this process who listens."""
+"""The history of missions as it grows, told to all listeners in this process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.jobs.clock import wait_for
 from app.missions.model import Entry
 from app.missions.store import MissionStore
 
-# Events that are told from memory; who is further behind gets them from the table.
+# Events that are told from memory; a listener that is further behind gets them from the table.
 _REMEMBERED = 256
 _READ_AT_ONCE = 100
 # Where another service may write, the table is looked at as often; elsewhere in case something was missed.
@@ -35,14 +35,14 @@ class Told:
 
 
 class _Growth:
-    """The newest events of one mission, as long as somebody listens.
+    """The newest events of one mission, as long as there is a listener.
 
     Attributes
     ----------
     changed
         Set at the next change, and then replaced: take it before looking, wait for it after.
     looks
-        How often somebody said that there may be more in the table than is remembered.
+        How often it was said that there may be more in the table than is remembered.
     """
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class _Growth:
         self._wake()
 
     def wake(self) -> None:
-        """Let everybody look at the table."""
+        """Let all listeners look at the table."""
         self.looks += 1
         self._wake()
 
@@ -94,7 +94,7 @@ class MissionStreams:
             growth.add(Told.of(entry))
 
     def wake(self, mission_id: str) -> None:
-        """Let those who listen to a mission look at the table."""
+        """Let the listeners of a mission look at the table."""
         if (growth := self._growing.get(mission_id)) is not None:
             growth.wake()
 

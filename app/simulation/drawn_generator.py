@@ -8,12 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.surroundings import Base
-
-Floats = npt.NDArray[np.float64]
+from app.simulation.arrays import Floats
 
 
 def drawn_size(

@@ -23,7 +23,7 @@ sys.path[:0] = [str(Path(__file__).parents[2])]
 from app.domain.problem import Problem  # noqa: E402
 from app.simulation.drawn_generator import drawn, drawn_size  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
-from app.solvers.local_search import effort, improvement, scale  # noqa: E402
+from app.solvers.local_search import effort, improvement, temperatures  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
 from app.solvers.scale import common_level, largest_level  # noqa: E402
@@ -34,7 +34,7 @@ PARTS: dict[str, Callable[[], None]] = {
     "gains": lambda: setattr(
         improvement, "gains", lambda arrays, _routes: (largest_level(arrays), common_level(arrays))
     ),
-    "distances": lambda: setattr(scale, "_COLD_LEGS", math.inf),
+    "distances": lambda: setattr(temperatures, "_COLD_LEGS", math.inf),
     "combining": lambda: setattr(effort, "_LONGEST_COMBINED", -1.0),
 }
 """Parts of the search, and how each is left out."""

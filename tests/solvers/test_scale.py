@@ -9,7 +9,7 @@ from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
 from app.solvers.local_search.annealing import new_search, set_routes
-from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
+from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import SolverContext
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.scale import common_level, largest_level

@@ -169,15 +169,9 @@ class Trial:
 
     def _settle(self, mission: str) -> None:
         end = time.monotonic() + _SETTLES_WITHIN_S
-        while self._send("GET", mission)["searching"] or self._is_about_to_change(mission):
+        while self._send("GET", mission)["searching"]:
             assert time.monotonic() < end, "the search does not end"
             time.sleep(_PAUSE_S)
-
-    def _is_about_to_change(self, mission: str) -> bool:
-        """Whether a plan was found that takes effect by itself, and has not yet."""
-        proposals = self._send("GET", f"{mission}/proposals")["proposals"]
-        automatic = self._send("GET", mission)["planning"]["plans"] == "automatic"
-        return automatic and any(each["status"] == "open" for each in proposals)
 
     def _hold(self, replay: dict[str, Any], plan: dict[str, Any]) -> None:
         """Hold the history against what was acknowledged, and against a day without kills."""

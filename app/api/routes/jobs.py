@@ -6,12 +6,13 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query
+from fastapi import APIRouter, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.access.guard import key_is_valid
+from app.api.event_streams import LastEventId, event_stream, last_seen
 from app.api.job_models import JobList, JobModel, job_list, job_response, problem_of
 from app.api.problem_details import responses
 from app.api.problem_models import ProblemModel
@@ -33,8 +34,6 @@ _EVENT = {
     },
     "required": ["id", "event", "data"],
 }
-_MAX_EVENT_ID_DIGITS = 18
-_FAREWELL_S = 2.0
 
 
 @router.get(
@@ -96,20 +95,14 @@ async def get_job_problem(job_id: JobId, services: Served) -> ProblemModel:
 async def get_job_events(
     job_id: JobId,
     services: Served,
-    last_event_id: Annotated[
-        str | None, Header(description="Id of the last event that was seen: only later ones are sent")
-    ] = None,
+    last_event_id: LastEventId = None,
 ) -> Response:
     """Stream a job's progress until it ends; a client that was cut off goes on after its last event."""
     job = await services.jobs.look(job_id)  # an unknown job is answered before the stream begins
-    given = last_event_id or ""
-    known = given.isascii() and given.isdigit() and len(given) <= _MAX_EVENT_ID_DIGITS
-    after = int(given) if known else 0
+    after = last_seen(last_event_id)
     if services.jobs.has_told_all(job, after):
         return Response(status_code=204)
-    return EventSourceResponse(
-        _events(services.jobs, job_id, after, key_is_valid.get()), shutdown_grace_period=_FAREWELL_S
-    )
+    return event_stream(_events(services.jobs, job_id, after, key_is_valid.get()))
 
 
 @router.delete(

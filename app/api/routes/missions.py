@@ -7,12 +7,13 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing, suppress
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Header, Query
+from fastapi import APIRouter, Body, Query
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.access.guard import key_is_valid
+from app.api.event_streams import LastEventId, event_stream, last_seen
 from app.api.json_body import JsonRoute
 from app.api.mission_models import (
     MAX_NUMBER,
@@ -55,8 +56,6 @@ _EVENT = {
     },
     "required": ["id", "event", "data"],
 }
-_FAREWELL_S = 2.0
-_MOST_DIGITS = 9
 _BODY_PROBLEMS = ("malformed-json", "body-too-large", "unsupported-media-type", "invalid-request")
 
 
@@ -272,18 +271,12 @@ async def get_mission_replay(mission_id: MissionId, services: Served) -> Respons
 async def stream_mission(
     mission_id: MissionId,
     services: Served,
-    last_event_id: Annotated[
-        str | None, Header(description="Id of the last event that was seen: only later ones are sent")
-    ] = None,
+    last_event_id: LastEventId = None,
 ) -> Response:
     """Stream what happens, until the mission is deleted; a client that was cut off goes on where it was."""
     await asyncio.to_thread(services.missions.store.get, mission_id)
-    given = last_event_id or ""
-    known = given.isascii() and given.isdigit() and len(given) <= _MOST_DIGITS
-    return EventSourceResponse(
-        _events(services.missions, mission_id, int(given) if known else 0, key_is_valid.get()),
-        shutdown_grace_period=_FAREWELL_S,
-    )
+    after = min(last_seen(last_event_id), MAX_NUMBER)
+    return event_stream(_events(services.missions, mission_id, after, key_is_valid.get()))
 
 
 async def _events(

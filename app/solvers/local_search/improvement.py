@@ -27,7 +27,7 @@ from app.solvers.local_search.annealing import (
 )
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import large_moves, moves_a_second, rounds_for
-from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
+from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import StopCriterion
 
 _PIECE_S = 0.002
@@ -53,7 +53,8 @@ _PATIENT_MOVES_A_STOP = 2_000
 class Cooling(NamedTuple):
     """Temperatures of a round and the price of a useless visit, in what visits earn.
 
-    The hottest is in largest gains, the rest in common ones (:func:`~app.solvers.local_search.scale.gains`).
+    The hottest is in largest gains, the rest in common ones; see
+    :func:`~app.solvers.local_search.temperatures.gains`.
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ from app.solvers.bound.enumeration import is_tiny
 from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of
 from app.solvers.local_search.effort import large_moves
-from app.solvers.local_search.scale import coldest_by_distance, gains, neighbour_leg
+from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import History, Progress, Proof, Report, Solution, Solver, StopCriterion
 from app.solvers.seeds import seed_sequence
 from app.solvers.stop import share_of_time
