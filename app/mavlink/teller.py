@@ -122,8 +122,8 @@ class Teller:
         with self._lock:
             positions, self._positions = list(self._positions.values()), {}
         if positions:
-            self._tell({"type": "telemetry", "positions": positions})
             self._seen_since_clock = True
+            self._tell({"type": "telemetry", "positions": positions})
 
     def _tell_clock(self) -> None:
         if self._seen_since_clock:

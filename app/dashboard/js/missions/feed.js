@@ -10,6 +10,8 @@ import { get, set } from "../state.js";
 const OPEN = "dispatch-open-mission";
 /** Events that are read when a mission is opened; earlier ones are read when they are asked for. */
 const READ_AT_ONCE = 100;
+/** So many are kept while others come; those before can be read again. */
+const MOST_KEPT = 500;
 /** A search that has found nothing better tells no event: while there is one, the mission is asked so often. */
 const LOOK_AGAIN_MS = 1000;
 const TRIES = 5;
@@ -131,7 +133,7 @@ class Feed {
     const { events, positions } = get().openMission;
     if (event.number <= (events[0]?.number ?? 0)) return;
     const seen = event.type === "telemetry" ? Object.fromEntries(event.event.positions.map((each) => [each.uav_id, { ...each, number: event.number }])) : {};
-    patch({ connected: true, events: [event, ...events], positions: newest(positions, seen) });
+    patch({ connected: true, events: [event, ...events].slice(0, MOST_KEPT), positions: newest(positions, seen) });
     // Positions count with the next event of another type: until then the state stays.
     if (event.type !== "telemetry") void this.read();
   }

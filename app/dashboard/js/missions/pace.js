@@ -52,12 +52,17 @@ async function tick() {
     told("");
   } catch (error) {
     if (error.status === 404) return halt();
-    // Another dispatcher has moved the clock beyond this one: it goes on from there.
-    const ahead = error instanceof ApiError && error.violations.some(({ pointer }) => pointer === "/at");
-    if (ahead && get().openMission?.id === mission) anchor(mission, seconds, get().openMission.head.clock);
+    const behind = error instanceof ApiError && error.violations.some(({ pointer }) => pointer === "/at");
+    if (behind) await catchUp(mission, seconds);
     else told(`The clock stands: ${error.message}. It is tried again.`);
   }
   if (pace()?.mission === mission) goOn();
+}
+
+/** Another dispatcher has moved the clock beyond this one: it goes on from there. */
+async function catchUp(mission, seconds) {
+  const { clock } = await json(`missions/${mission}`).catch(() => ({}));
+  if (clock !== undefined && pace()?.mission === mission) anchor(mission, seconds, clock);
 }
 
 function anchor(mission, seconds, clock) {
