@@ -484,13 +484,16 @@ def test_what_comes_all_the_time_has_one_line_in_the_history(page, service):
     mission = Mission(service).search_ends().open(page)
     for n in range(3):
         mission.tell(f"tick-{n}", type="clock", at=0.1 * n)
-    mission.tell("lost", type="uav_lost", uav_id="u2")
+    for n, time in enumerate((0.25, 0.3)):
+        seen = [{"uav_id": "u1", "time": time, "x": 2 * time, "y": 0}]
+        mission.tell(f"seen-{n}", type="telemetry", positions=seen)
     mission.tell("tock", type="clock", at=0.5)
     lines = page.locator("[data-testid=mission-log] li")
-    expect(lines.nth(2)).to_contain_text("Time has passed and 2 before")
-    expect(lines.nth(1)).to_contain_text("u2 is lost")
+    expect(lines.nth(0)).to_have_text("0.5 Time has passed")
+    expect(lines.nth(1)).to_have_text("0.3 1 position and 1 before")
+    expect(lines.nth(2)).to_have_text("0.2 Time has passed and 2 before")
     mission.tell("tock 2", type="clock", at=0.6)
-    expect(lines.first).to_contain_text("Time has passed and 1 before")
+    expect(lines.first).to_have_text("0.6 Time has passed and 1 before")
 
 
 def test_what_could_not_be_sent_is_kept_and_counts_once(browser, service):

@@ -19,7 +19,7 @@ import { timeline } from "../timeline.js";
 let parts = null;
 let map = null;
 let looked = null; // another moment than the mission's clock: {at, number, state, plan}
-let wanted = null; // the moment that is asked for, or was asked for last
+let wanted = null; // the moment that is asked for, or was asked for last: {id, at}
 let asking = false;
 let trouble = "";
 let drawn = null; // what the tables show
@@ -47,7 +47,7 @@ function mount(root, context) {
   root.append(h("div", { hidden: false }, h("h2", { id: "missions-title" }, "Missions"), list.element), parts.body);
   parts.overview = root.firstElementChild;
   subscribe(["openMission"], ({ openMission: now }) => {
-    if (looked && looked.id !== now?.id) forget();
+    if (wanted && wanted.id !== now?.id) forget();
     // The moment that is looked at may be another one after each event.
     else if (looked && now.head.state_number !== looked.of) void ask();
     if (get().view === "missions") draw();
@@ -81,7 +81,7 @@ function look(at) {
     forget();
     return draw();
   }
-  wanted = at;
+  wanted = { id: get().openMission.id, at };
   void ask();
 }
 
@@ -95,17 +95,17 @@ function forget() {
 async function ask() {
   if (asking) return;
   asking = true;
-  try {
-    for (let at = null; wanted !== null && wanted !== at; ) {
-      at = wanted;
-      const { id, head } = get().openMission;
-      const found = await json(`missions/${id}/state?at=${at}`);
-      if (get().openMission?.id !== id || wanted === null) break;
-      looked = { ...found, at, id, of: head.state_number };
+  for (let last = null; wanted && wanted !== last; ) {
+    last = wanted;
+    const of = get().openMission.head.state_number;
+    try {
+      const found = await json(`missions/${last.id}/state?at=${last.at}`);
+      if (wanted?.id !== last.id) continue;
+      looked = { ...found, of };
       trouble = "";
+    } catch (error) {
+      if (wanted?.id === last.id) trouble = `The state at ${shown(last.at)} is not known: ${error.message}.`;
     }
-  } catch (error) {
-    trouble = `The state at ${shown(wanted)} is not known: ${error.message}.`;
   }
   asking = false;
   if (get().view === "missions" && get().openMission?.head) draw();
