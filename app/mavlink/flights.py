@@ -27,7 +27,9 @@ def require_geographic(problem: Mapping[str, Any]) -> None:
         raise NotGeographic("MAVLink", problem["crs"])
 
 
-def next_flights(state: Mapping[str, Any], plan: Mapping[str, Any]) -> dict[str, Flight]:
+def next_flights(
+    state: Mapping[str, Any], plan: Mapping[str, Any], matrices: Any = None
+) -> dict[str, Flight]:
     """Return the flight that each UAV is on, or begins next, by its id; one that stays where it is has none.
 
     Parameters
@@ -36,11 +38,14 @@ def next_flights(state: Mapping[str, Any], plan: Mapping[str, Any]) -> dict[str,
         As ``GET /missions/{id}`` has it.
     plan
         As ``GET /missions/{id}/plan`` has it.
+    matrices
+        Of the mission's problem, which states leave out; None without.
     """
     lost = set(state["lost"])
+    problem = state["problem"] if matrices is None else {**state["problem"], "matrices": matrices}
     return {
         route.uav.id: route.flown[0]
-        for route in flown_routes(problem_from_record(state["problem"]), plan["routes"])
+        for route in flown_routes(problem_from_record(problem), plan["routes"])
         if route.flies and route.uav.id not in lost
     }
 

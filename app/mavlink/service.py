@@ -56,6 +56,11 @@ class MissionClient:
         """Return the plan in force."""
         return self._ask("GET", f"{self._path}/plan", "the plan")
 
+    def matrices(self) -> dict[str, Any] | None:
+        """Return the matrices of the mission's problem, which states leave out; None without."""
+        problem: dict[str, Any] = self._ask("GET", f"{self._path}/replay", "the replay")["problem"]
+        return problem.get("matrices")
+
     def tell(self, event: Mapping[str, Any]) -> dict[str, Any]:
         """Tell an event; the same event with the same id again is not a second one."""
         return self._ask("POST", f"{self._path}/events", f"event {event['type']!r}", json=dict(event))

@@ -66,6 +66,7 @@ class Teller:
         self._seen_since_clock = False
         self._state_number: int | None = None
         self._was_away = False
+        self._matrices: dict[str, Any] | None = None
         self.flights: Mapping[str, Flight] = {}
         self.told = 0
 
@@ -157,5 +158,8 @@ class Teller:
         plan = self._client.plan()
         # An event that came between the two is seen at the next look.
         if plan["number"] == head["state_number"]:
-            self.flights = next_flights(head["state"], plan)
+            problem = head["state"]["problem"]
+            if self._matrices is None and any(uav.get("location") is not None for uav in problem["uavs"]):
+                self._matrices = self._client.matrices()
+            self.flights = next_flights(head["state"], plan, self._matrices)
             self._state_number = head["state_number"]

@@ -1,5 +1,7 @@
 """Simulated vehicles and a real service, over UDP on the loopback interface, with lost messages."""
 
+import os
+import signal
 import struct
 import subprocess
 import sys
@@ -252,6 +254,33 @@ def test_the_command_reads_a_log(service, begin, tmp_path):
     assert "5 positions" in ended.output
     assert mission.read()["positions"]["mid-2"]["time"] == pytest.approx(1 + 4 / 3600)
     assert mission.read()["clock"] == 0
+
+
+def test_the_command_listens_until_it_is_interrupted(service, begin):
+    mission = begin()
+    free = UdpStream("127.0.0.1:0")
+    port = free.port
+    free.close()
+
+    def interrupt():
+        try:
+            wait_for(lambda: mission.read()["positions"])
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with SimulatedVehicle(1, port, HOME):
+        thread = threading.Thread(target=interrupt)
+        thread.start()
+        ended = CliRunner().invoke(
+            application, ["fly", mission.id, f"127.0.0.1:{port}", "--url", service.url]
+        )
+        thread.join()
+
+    assert ended.exit_code == 0, ended.output
+    assert f"vehicles are listened to at 127.0.0.1:{port}" in ended.output
+    assert int(ended.output.split()[-2]) == sum(
+        len(each["event"]["positions"]) for each in mission.events("telemetry")
+    )
 
 
 def test_what_cannot_be_flown_says_why(service, begin, tmp_path):

@@ -11,7 +11,7 @@ import { stopsAhead } from "./doing.js";
 
 const SINGLE = new Set(["number", "integer", "boolean", "string"]);
 /** Fields of UAVs and areas that the mission itself keeps, or that say what an item is and not how it is. */
-const KEPT = new Set(["id", "x_c", "y_c", "dis", "ret", "airborne", "available_from", "location", "home_location"]);
+const KEPT = new Set(["id", "x_c", "y_c", "dis", "ret", "airborne", "available_from"]);
 const TITLES = { x_s: "Start x", y_s: "Start y", voyage: "Range", level: "Urgency" };
 
 /** A choice among items, told apart by their ids. */

@@ -184,11 +184,18 @@ function markSelection() {
 }
 
 /** Bring the problem that remains on the page, where it can be allocated, changed by hand and taken away. */
-function takeOver() {
+async function takeOver() {
   const on = moment();
   if (!on) return;
   const { name, id } = get().openMission.head;
-  change({ problem: normalised(on.state.problem), problemName: `${name ?? id.slice(0, 8)} at ${shown(on.state.clock)}`, opened: newOpening(), answer: null, answerProblem: null, incumbent: null, selection: null });
+  let matrices;
+  try {
+    // States have no matrices: those of the mission's first problem stay as they are.
+    if (on.state.problem.uavs.some(({ location }) => location != null)) ({ matrices } = (await json(`missions/${id}/replay`)).problem);
+  } catch (error) {
+    return notify(error.message, "error");
+  }
+  change({ problem: normalised({ ...on.state.problem, matrices }), problemName: `${name ?? id.slice(0, 8)} at ${shown(on.state.clock)}`, opened: newOpening(), answer: null, answerProblem: null, incumbent: null, selection: null });
   set({ view: "problem" });
   notify("What remains of the mission is open as a problem; the mission goes on by itself", "info", { title: "Undo", act: undo });
 }
