@@ -11,6 +11,7 @@ from threading import Event, Thread
 from typing import Any
 
 from app.api.plan_formats.errors import OutOfRange
+from app.api.plan_formats.flights import Flight
 from app.api.plan_formats.mission import FlightChoices
 from app.mavlink.flights import goes_on, items_for, require_geographic, stops_of
 from app.mavlink.service import MissionClient
@@ -222,29 +223,30 @@ class _Bridge:
             self.teller.see(position)
         if getattr(message, "target_system", None) == SYSTEM:
             now_s = time.monotonic()
-            if message.get_type() == "MISSION_REQUEST_LIST" and not self._is_under_way(system):
-                self._begin(system, vehicle, message.get_srcComponent(), now_s)
-            elif system in self._transfers:
+            if system in self._transfers:
                 self._transfers[system].take(message, now_s)
-
-    def _is_under_way(self, system: int) -> bool:
-        return system in self._transfers
+            elif message.get_type() == "MISSION_REQUEST_LIST" and self.teller.flights is not None:
+                # Until the plan is known there is no answer: a mission of no items would be a wrong one.
+                flight = self.teller.flights.get(vehicle.uav_id)
+                self._begin(system, vehicle, message.get_srcComponent(), flight, now_s)
 
     def _offer(self, now_s: float) -> None:
         """Offer a flight to every vehicle that the plan gives another one than it has."""
-        if not self._choices.upload:
+        flights = self.teller.flights
+        if not self._choices.upload or flights is None:
             return
         for system, vehicle in self._fleet.known.items():
-            flight = self.teller.flights.get(vehicle.uav_id)
-            if flight is None or vehicle.component is None or self._is_under_way(system):
+            flight = flights.get(vehicle.uav_id)
+            if flight is None or vehicle.component is None or system in self._transfers:
                 continue
             if goes_on(self._flying.get(system, ()), stops_of(flight)):
                 continue
             if now_s >= self._not_before.get(system, 0.0):
-                self._begin(system, vehicle, vehicle.component, now_s)
+                self._begin(system, vehicle, vehicle.component, flight, now_s)
 
-    def _begin(self, system: int, vehicle: Vehicle, component: int, now_s: float) -> None:
-        flight = self.teller.flights.get(vehicle.uav_id)
+    def _begin(
+        self, system: int, vehicle: Vehicle, component: int, flight: Flight | None, now_s: float
+    ) -> None:
         self._not_before[system] = now_s + _RETRY_UPLOAD_S
         try:
             items = () if flight is None else items_for(flight, self._choices.flight, vehicle.autopilot)

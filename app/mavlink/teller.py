@@ -41,7 +41,7 @@ class Teller:
     Attributes
     ----------
     flights
-        The next flight of each UAV by its id, replaced as a whole.
+        The next flight of each UAV by its id, replaced as a whole; None until the plan is known.
     told
         How many positions the service has.
     """
@@ -67,7 +67,7 @@ class Teller:
         self._state_number: int | None = None
         self._was_away = False
         self._matrices: dict[str, Any] | None = None
-        self.flights: Mapping[str, Flight] = {}
+        self.flights: Mapping[str, Flight] | None = None
         self.told = 0
 
     def see(self, position: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import threading
 
 import httpx
 import pytest
@@ -61,7 +62,7 @@ class Mission:
 
     def search_ends(self):
         while self.read()["searching"]:
-            pass
+            threading.Event().wait(0.05)
         return self
 
     def open(self, page):

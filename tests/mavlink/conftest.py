@@ -1,5 +1,6 @@
 """A service whose missions are flown by simulated vehicles."""
 
+import threading
 from collections.abc import Iterator
 
 import httpx
@@ -40,13 +41,22 @@ class Mission:
         return self._ask("POST", "/events", json={"id": name, **event}).json()
 
     def accept(self, name):
-        """Accept the open proposal, once the search has ended; say whether there was one."""
-        while self.read()["searching"]:
-            pass
-        found = [each for each in self.read("/proposals")["proposals"] if each["status"] == "open"]
-        for each in found:
-            self.tell(name, type="proposal_accepted", proposal=each["number"])
-        return bool(found)
+        """Accept the open proposal, once the search has ended; say whether there was one.
+
+        Vehicles that are seen elsewhere than planned may outdate it before it is accepted: another one comes.
+        """
+        for attempt in range(20):
+            while self.read()["searching"]:
+                threading.Event().wait(0.05)
+            found = [each for each in self.read("/proposals")["proposals"] if each["status"] == "open"]
+            if not found:
+                return False
+            event = {"type": "proposal_accepted", "id": f"{name}-{attempt}", "proposal": found[0]["number"]}
+            answer = httpx.post(f"{self.url}/events", json=event, timeout=60)
+            if answer.status_code != 409:
+                answer.raise_for_status()
+                return True
+        raise AssertionError(f"no proposal could be accepted: {answer.text}")
 
     def events(self, of_type):
         told = self.read("/events?limit=1000")["events"]

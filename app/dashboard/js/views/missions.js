@@ -44,7 +44,7 @@ function mount(root, context) {
     h("div", { class: "row spread" }, parts.title, parts.link),
     h("div", { class: "row" }, h("button", { type: "button", onclick: () => openMission(null) }, "All missions"), h("button", { type: "button", onclick: takeOver }, "Open what remains as a problem")),
     parts.says, parts.cards);
-  root.append(h("div", { hidden: false }, h("h2", { id: "missions-title" }, "Missions"), list.element), parts.body);
+  root.append(h("div", {}, h("h2", {}, "Missions"), list.element), parts.body);
   parts.overview = root.firstElementChild;
   subscribe(["openMission"], ({ openMission: now }) => {
     if (wanted && wanted.id !== now?.id) forget();
@@ -65,7 +65,6 @@ function show() {
 function hide() {
   parts.list.hide();
   map.showPlan(null);
-  parts.overview.hidden = true;
 }
 
 /** The moment on screen: what is looked at, or the mission as it stands. */
