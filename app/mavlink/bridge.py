@@ -157,6 +157,8 @@ def fly(stream: UdpStream, client: MissionClient, choices: Choices, say: Say, st
 
     Raises
     ------
+    ServiceAway
+        If it cannot be reached at the beginning; later that is waited for.
     ServiceRefused, NotGeographic, UnknownVehicle
         If the mission is none for this, or is no more.
     """

@@ -3,6 +3,7 @@
 MavlinkError
  ├─ PackageMissing     pymavlink or httpx is not installed
  ├─ UnknownVehicle     a system id or a UAV that is not there
+ ├─ ServiceAway        the service cannot be reached now
  ├─ ServiceRefused     the service refuses what it was asked
  └─ LinkFailed         the stream cannot be opened
 """
@@ -28,6 +29,10 @@ class UnknownVehicle(MavlinkError):
 
     def __init__(self, system: int, uav_id: str, why: str, known: Sequence[str]) -> None:
         super().__init__(f"system {system}: {uav_id!r} {why}; the mission has {', '.join(known)}")
+
+
+class ServiceAway(MavlinkError):
+    """The service cannot be reached, or has no time: the same may be asked again."""
 
 
 class ServiceRefused(MavlinkError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from app.mavlink.errors import PackageMissing, ServiceRefused
+from app.mavlink.errors import PackageMissing, ServiceAway, ServiceRefused
 
 try:
     import httpx
@@ -14,10 +14,6 @@ except ModuleNotFoundError as error:
 
 _PATIENCE_S = 10.0
 _TOO_MANY, _BROKEN = 429, 500
-
-
-class Away(Exception):
-    """The service cannot be reached, or has no time: the same may be asked again."""
 
 
 class MissionClient:
@@ -47,7 +43,7 @@ class MissionClient:
 
         Raises
         ------
-        Away, ServiceRefused
+        ServiceAway, ServiceRefused
             As all methods: if it cannot be had now, or at all.
         """
         return self._ask("GET", self._path, "the mission")
@@ -69,9 +65,9 @@ class MissionClient:
         try:
             answer = self._http.request(method, path, **content)
         except httpx.TransportError as error:
-            raise Away(f"{what}: {error}") from error
+            raise ServiceAway(f"{what}: {error}") from error
         if answer.status_code == _TOO_MANY or answer.status_code >= _BROKEN:
-            raise Away(f"{what}: the service answers {answer.status_code}")
+            raise ServiceAway(f"{what}: the service answers {answer.status_code}")
         if not answer.is_success:
             raise ServiceRefused(answer.status_code, what, _detail_of(answer))
         told: dict[str, Any] = answer.json()

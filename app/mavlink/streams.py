@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -99,10 +100,14 @@ class UdpStream:
         return heard
 
     def send(self, system: int, kind: str, fields: dict[str, Any]) -> None:
-        """Send a message, by the name of its type and its fields, to where a system was heard last."""
+        """Send a message, by the name of its type and its fields, to where a system was heard last.
+
+        What the network does not take is lost, as any other message may be.
+        """
         message = getattr(self._writer, f"{kind.lower()}_encode")(**fields)
         self._socket.setblocking(True)
-        self._socket.sendto(message.pack(self._writer), self._places[system])
+        with suppress(OSError):
+            self._socket.sendto(message.pack(self._writer), self._places[system])
         self._writer.seq = (self._writer.seq + 1) % 256
 
     def say_alive(self) -> None:

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from app.api.plan_formats.flights import Flight
-from app.mavlink.errors import ServiceRefused
+from app.mavlink.errors import ServiceAway, ServiceRefused
 from app.mavlink.flights import next_flights
-from app.mavlink.service import Away, MissionClient
+from app.mavlink.service import MissionClient
 
 PLAN_EVERY_S = 1.0
 """So often the mission is asked whether its plan has changed."""
@@ -103,7 +103,7 @@ class Teller:
                 self._tell_clock()
             if self._watches_plan and self._is_due("plan", PLAN_EVERY_S, now_s):
                 self._look_at_plan()
-        except Away as error:
+        except ServiceAway as error:
             if not self._was_away:
                 self._say(f"{error}; it is tried again")
             self._was_away = True

@@ -168,13 +168,14 @@ def test_a_refused_flight_is_said(service, begin):
 @contextmanager
 def losing_answers(url, every):
     """Stand before a service, and lose the answer to every n-th event after it was told."""
-    counted = []
+    counted, keys = [], set()
 
     class Between(BaseHTTPRequestHandler):
         def do_GET(self):
             self._pass_on(httpx.get(url + self.path, timeout=60))
 
         def do_POST(self):
+            keys.add(self.headers["Authorization"])
             body = self.rfile.read(int(self.headers["Content-Length"]))
             answer = httpx.post(
                 url + self.path, content=body, headers={"Content-Type": "application/json"}, timeout=60
@@ -198,7 +199,7 @@ def losing_answers(url, every):
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
     try:
-        yield f"http://127.0.0.1:{server.server_address[1]}", counted
+        yield f"http://127.0.0.1:{server.server_address[1]}", counted, keys
     finally:
         server.shutdown()
         thread.join()
@@ -227,12 +228,13 @@ def a_log(file, seconds=60, system=1):
 def test_a_log_is_told_once_though_answers_are_lost(service, begin, tmp_path):
     mission = begin()
     lines = []
-    with losing_answers(service.url, every=3) as (url, counted):
-        client = MissionClient(url, mission.id, None)
+    with losing_answers(service.url, every=3) as (url, counted, keys):
+        client = MissionClient(url, mission.id, "a-key")
         told = read_log(a_log(tmp_path / "day.tlog"), client, Choices({}, clock_every_s=20.0), lines.append)
         client.close()
     batches = mission.events("telemetry")
     assert counted.count(200) > 5  # known already
+    assert keys == {"Bearer a-key"}
     assert told == len(batches) == 60
     assert len({each["id"] for each in batches}) == 60
     assert any("502" in line for line in lines)
@@ -301,6 +303,8 @@ def test_what_cannot_be_flown_says_why(service, begin, tmp_path):
     (tmp_path / "empty.tlog").write_bytes(b"nothing of it")
     assert "no MAVLink message" in said(mission.id, str(tmp_path / "empty.tlog"))
     assert "the service answers 404" in said("0" * 32, str(file))
+    away = CliRunner().invoke(application, ["fly", mission.id, str(file), "--url", "http://127.0.0.1:9"])
+    assert (away.exit_code, "the mission: " in away.output) == (1, True)
     assert "a host and a port are needed" in said(mission.id, "nowhere")
 
 
