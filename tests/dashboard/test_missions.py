@@ -349,26 +349,34 @@ def test_areas_and_uavs_are_placed_on_the_map(page, service):
 def test_a_zone_is_drawn_and_what_it_breaks_is_said(page, service):
     mission = Mission(service).search_ends().open(page)
     page.locator("[data-draw=mission-zone]").click()
-    page.evaluate(
-        """async () => {
-            const { get } = await import("/dashboard/js/state.js");
-            window.corners = [[-2, 13], [2, 13], [2, 15], [-2, 15]];
-        }"""
-    )
     for x, y in ((300, 100), (500, 100), (500, 200)):
         page.locator("#map").click(position={"x": x, "y": y})
     page.locator("#map").press("Enter")
+    # Meanwhile another dispatcher closes one, too.
+    other = {"id": "other", "polygon": [[40, 40], [41, 40], [41, 41]]}
+    mission.tell("other", type="zones_changed", no_fly_zones=[*SMALL["no_fly_zones"], other])
+    at_the_newest(page, mission)
     tell(page)
-    zones = newest(page, mission, "zones_changed")["event"]["no_fly_zones"]
-    assert [zone["id"] for zone in zones] == ["tower", "zone-2"]
-    assert len(zones[1]["polygon"]) == 3
-    expect(page.locator("path.no-fly-zone[data-zone-id='zone-2']")).to_be_attached()
+    expect(page.locator("path.no-fly-zone[data-zone-id='zone-3']")).to_be_attached()
+    zones = mission.read()["state"]["problem"]["no_fly_zones"]
+    assert [zone["id"] for zone in zones] == ["tower", "other", "zone-3"]
+    assert len(zones[2]["polygon"]) == 3
     # A closed area: no stop of the plan is left there, and the history says which rule it is.
     closed = [{"id": "shut", "polygon": [[-2, 13], [2, 13], [2, 15], [-2, 15]]}]
     effect = mission.tell("shut", type="zones_changed", no_fly_zones=closed)["effect"]
     assert [each["target_id"] for each in effect["broken"]] == ["far"]
     row = page.locator("[data-testid=mission-log] li.broken").first
     expect(row).to_contain_text(f"u2 does not stop at far: {effect['broken'][0]['says']}")
+
+
+def test_what_was_filled_in_for_one_mission_is_not_told_to_another(page, service):
+    first, second = (Mission(service).search_ends() for _ in range(2))
+    first.open(page)
+    select(page, "uavs", "u1")
+    page.locator("#mission-acts button[data-type=uav_lost]").click()
+    second.open(page)
+    expect(page.locator("#view-missions h2", has_text=second.id[:8])).to_be_visible()
+    expect(page.locator("form[data-form=uav_lost]")).to_have_count(0)
 
 
 def test_an_area_that_is_found_otherwise_keeps_what_it_has_got(page, service):
@@ -479,6 +487,10 @@ def test_telemetry_moves_the_uavs_on_the_map(page, service):
     at_the_newest(page, mission)
     then = mission.read()["state"]["problem"]["uavs"][0]
     assert page.evaluate(where) == [then["x_c"], then["y_c"]]
+    # What is selected here is nothing of the problem on screen.
+    select(page, "uavs", "u1")
+    go(page, "problem")
+    assert state(page, "selection") is None
 
 
 def test_what_comes_all_the_time_has_one_line_in_the_history(page, service):

@@ -143,11 +143,14 @@ function stockChanged({ base_id: id }, { state: { problem } }) {
   return { title: `Stock of ${called(base)}`, parts: [stock], read: () => ({ type: "stock_changed", base_id: id, stock: stock.read() }) };
 }
 
-function zonesChanged({ polygon, without }, { state: { problem } }) {
-  const zones = problem[ZONES] ?? [];
-  const now = without ? zones.filter(({ id }) => id !== without) : [...zones, { id: freeId(ZONES, zones), polygon }];
+function zonesChanged({ polygon, without }) {
+  // All zones are told: those that there are when it is told, as others may have changed them since it was opened.
+  const now = () => {
+    const zones = get().openMission.head.state.problem[ZONES] ?? [];
+    return without ? zones.filter(({ id }) => id !== without) : [...zones, { id: freeId(ZONES, zones), polygon }];
+  };
   const says = without ? "It may be flown through again." : `It has ${polygon.length} corners.`;
-  return { title: without ? `${without} is open again` : "A zone is closed", says, parts: [], read: () => ({ type: "zones_changed", no_fly_zones: now }) };
+  return { title: without ? `${without} is open again` : "A zone is closed", says, parts: [], read: () => ({ type: "zones_changed", no_fly_zones: now() }) };
 }
 
 function windChanged(_, { state: { problem } }) {

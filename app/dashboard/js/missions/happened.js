@@ -26,7 +26,7 @@ export class Happened {
    * @param {() => {state: object, plan: object} | null} momentOf the moment on screen
    */
   constructor(map, momentOf) {
-    Object.assign(this, { map, momentOf, form: null });
+    Object.assign(this, { map, momentOf, id: null });
     this.acts = h("div", { class: "row", id: "mission-acts" });
     this.place = h("div", { class: "block" });
     const zone = drawingControls(map, { id: "mission-drawing", take: (polygon) => this.open("zones_changed", { polygon }) });
@@ -48,10 +48,14 @@ export class Happened {
 
   /** Offer what can happen to what is selected. */
   draw() {
+    const { id } = get().openMission;
+    // What was filled in for one mission is not told to another.
+    if (this.id !== id) this.close();
+    this.id = id;
     const moment = this.momentOf();
     const { selection } = get();
     const item = selection && moment?.state.problem[selection.kind]?.find(({ id }) => id === selection.id);
-    const key = item ? `${selection.kind} ${item.id}` : "";
+    const key = `${id} ${item ? `${selection.kind} ${item.id}` : ""}`;
     if (this.acts.dataset.of === key) return;
     this.acts.dataset.of = key;
     if (!item) return this.acts.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area, a base or a zone on the map or in a table to say what has happened to it."));
@@ -88,10 +92,9 @@ export class Happened {
   }
 
   async #tell(form, send, others, event) {
-    const { id } = get().openMission;
     send.disabled = true;
     try {
-      const answer = await tell(id, event);
+      const answer = await tell(this.id, event);
       if (form.isConnected) this.close();
       if (answer) notify(told(answer));
       else notify("It could not be sent, and is kept: send it again below", "error");

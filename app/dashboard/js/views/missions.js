@@ -13,7 +13,7 @@ import { Proposals } from "../missions/proposals.js";
 import { missionTables } from "../missions/tables.js";
 import { newOpening, normalised } from "../problem.js";
 import { registerView } from "../registry.js";
-import { get, set, subscribe } from "../state.js";
+import { get, select, set, subscribe } from "../state.js";
 import { timeline } from "../timeline.js";
 
 let parts = null;
@@ -65,6 +65,9 @@ function show() {
 function hide() {
   parts.list.hide();
   map.showPlan(null);
+  const { selection, problem } = get();
+  // The other views know the items of their problem only.
+  if (selection && !problem[selection.kind]?.some(({ id }) => id === selection.id)) select(null);
 }
 
 /** The moment on screen: what is looked at, or the mission as it stands. */
