@@ -1,9 +1,10 @@
-"""The command line: the service, allocating and evaluating without it, training, the paper's figures."""
+"""The command line: the service, work without it, vehicles, training, the paper's figures."""
 
 from __future__ import annotations
 
 import typer
 
+from app.cli.flying import fly
 from app.cli.keys import create_key, list_keys, revoke_key
 from app.cli.reproduction import reproduce
 from app.cli.service import allocate, backup, compile_code, evaluate, serve
@@ -12,7 +13,7 @@ from app.cli.training import export, train, train_universal
 application = typer.Typer(
     help="Task allocation of UAV swarms with relief materials.", no_args_is_help=True, add_completion=False
 )
-for command in (serve, allocate, evaluate, train, train_universal, reproduce, export, backup):
+for command in (serve, allocate, evaluate, train, train_universal, reproduce, export, backup, fly):
     application.command()(command)
 application.command("compile")(compile_code)
 

@@ -16,6 +16,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from app.api.access.keys import KeyStore
 from app.api.errors import RequestError
 from app.domain.errors import AllocatorError
+from app.mavlink.errors import MavlinkError
 from app.reproduction.errors import ReproductionError
 from app.settings import Settings
 from policy_store.database import Database
@@ -83,7 +84,7 @@ def refusals() -> Iterator[None]:
         lines = [f"{e.pointer or 'the request'}: {e.detail}" for e in error.errors] or [error.detail]
     except AllocatorError as error:
         lines = [f"{v.pointer}: {v.detail}" for v in error.violations] or [error.detail]
-    except (OSError, ValueError, ReproductionError, PolicyStoreError, SQLAlchemyError) as error:
+    except (OSError, ValueError, MavlinkError, ReproductionError, PolicyStoreError, SQLAlchemyError) as error:
         lines = [str(error)]
     for line in lines:
         typer.echo(line, err=True)

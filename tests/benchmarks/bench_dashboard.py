@@ -97,7 +97,7 @@ def measure(page: Page, url: str, n_uavs: int, n_targets: int) -> None:
     ]
     times = {name: page.evaluate(_TIMED, [step, argument]) for name, step, argument in steps}
     show_answer(page, url, algorithm="greedy")
-    for view in ("answer", "field", "problem"):
+    for view in ("answer", "missions", "problem"):
         times[f"view {view}"] = page.evaluate(_TIMED, ["show", view])
     shapes = page.evaluate(_WATCH)
     box = page.locator("#map").bounding_box()

@@ -62,15 +62,8 @@ def take_all(page: Page, url: str, out: Path) -> None:
     page.locator("#view-compare button[type=submit]").click()
     expect(page.get_by_test_id("compare-status")).to_contain_text("have a plan", timeout=60_000)
     take("compare")
-    go(page, "field")
-    page.locator("#field-time").fill("0.6")
-    page.locator("#field-time").press("Tab")
-    page.get_by_label("mid-2 is lost").check()
-    page.locator("#view-field input[name=time_limit_s]").fill("1")
-    page.get_by_role("button", name="Allocate again from here").click()
-    expect(page.get_by_test_id("field-changes")).to_be_visible(timeout=60_000)
-    page.locator("#panel").evaluate("(panel) => panel.scrollTo(0, 0)")
-    take("field")
+    take_mission(page)
+    take("missions")
     go(page, "library")
     expect(page.locator("article.policy").first).to_be_visible()
     take("library")
@@ -79,6 +72,24 @@ def take_all(page: Page, url: str, out: Path) -> None:
     page.set_viewport_size({"width": 820, "height": 1180})
     go(page, "answer")
     take("tablet")
+
+
+def take_mission(page: Page) -> None:
+    """Begin a mission with the plan on screen, and lose a UAV half an hour later."""
+    go(page, "missions")
+    page.locator("#mission-form input[name=name]").fill("First day")
+    page.get_by_role("button", name="Begin the mission").click()
+    expect(page.get_by_test_id("mission-UAVs")).to_be_visible(timeout=60_000)
+    page.locator("#mission-time").fill("0.3")
+    page.locator("#mission-time").press("Tab")
+    page.get_by_role("button", name="Move the clock here").click()
+    expect(page.locator("[data-testid=mission-log] li[data-type=clock]")).to_be_attached()
+    page.locator("[data-testid=mission-UAVs] tr[data-uav=mid-2] button").click()
+    page.locator("#mission-acts button[data-type=uav_lost]").click()
+    page.get_by_test_id("mission-happened").get_by_role("button", name="Tell").click()
+    expect(page.get_by_role("button", name="Accept")).to_be_visible(timeout=60_000)
+    page.evaluate("async () => (await import('/dashboard/js/state.js')).select(null)")
+    page.locator("#panel").evaluate("(panel) => panel.scrollTo(0, 0)")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,12 @@
 """Every view and dialog of the dashboard against axe-core's rules of WCAG 2.2 (A, AA), and by keyboard."""
 
+import httpx
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from dashboard_steps import PATIENCE_MS, begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
+
+from app.api.openapi_examples import example_problem
 
 RULES = {
     "resultTypes": ["violations"],
@@ -15,7 +18,7 @@ RULES = {
 AUDIT = """async (rules) => (await axe.run(rules)).violations.map(
     ({ id, nodes }) => [id, nodes.map(({ html }) => html.slice(0, 200))]
 )"""
-VIEWS = ("problem", "allocate", "answer", "compare", "field", "library", "take-away", "recent")
+VIEWS = ("problem", "allocate", "answer", "compare", "missions", "library", "take-away", "recent")
 FOCUSED = "document.activeElement.id || document.activeElement.textContent"
 
 
@@ -135,6 +138,38 @@ def test_bases_and_answers_with_reloads_are_accessible(audited, service):
     go(page, "problem")
     page.locator("button[data-table=bases]").click()
     faults.append(violations(page))
+    assert faults == [[], [], []]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_mission_breaks_a_rule(audited, service, scheme):
+    page = audited
+    page.emulate_media(color_scheme=scheme)
+    problem = example_problem("cyclone-idai")
+    problem = {key: problem[key] for key in problem if key not in {"algorithm", "time_limit_s"}}
+    begun = {"problem": problem, "time_limit_s": 0.2, "name": "audited"}
+    mission = httpx.post(f"{service.url}/missions", json=begun, timeout=60).raise_for_status().json()["id"]
+    go(page, "missions")
+    faults = [violations(page)]
+    page.get_by_role("button", name="Open mission audited").first.click()
+    expect(page.get_by_role("button", name="Accept")).to_be_visible()
+    faults.append(violations(page))
+    page.get_by_role("button", name="Accept").click()
+    expect(page.locator("li[data-type=proposal_accepted]")).to_be_attached()
+    page.locator("[data-testid=mission-UAVs] tbody button").first.click()
+    page.route("**/events", lambda route: route.abort())
+    for event in ("uav_lost", "visit_done"):
+        page.locator(f"#mission-acts button[data-type={event}]").click()
+        if event == "uav_lost":
+            page.get_by_test_id("mission-happened").get_by_role("button", name="Tell").click()
+            expect(page.get_by_test_id("mission-untold")).to_be_visible()
+    page.unroute("**/events")
+    page.locator("#view-missions details").evaluate_all("all => all.forEach((each) => { each.open = true; })")
+    faults.append(violations(page))
+    page.get_by_role("button", name="Discard").click()
+    page.get_by_role("button", name="All missions").click()
+    httpx.delete(f"{service.url}/missions/{mission}", timeout=60).raise_for_status()
+
     assert faults == [[], [], []]
 
 

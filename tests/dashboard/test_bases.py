@@ -101,18 +101,8 @@ def test_a_plan_with_reloads_is_changed_by_hand_and_begun_with(shown):
     assert state(page, "problem")["start_plan"] == answer["assignment"][:3] == [[0], [3], [1]]
 
 
-def test_the_mission_goes_on_through_a_reload(shown):
+def test_bases_are_in_the_picture_of_each_plan(shown):
     page, _ = shown
-    go(page, "field")
-    for clock, says in (
-        ("6", "reloads at base Depot"),
-        ("7", "waiting"),
-        ("29", "to b"),
-        ("5", "to base Depot"),
-    ):
-        page.locator("#field-time").fill(clock)
-        page.locator("#field-time").dispatch_event("change")
-        expect(page.get_by_test_id("field-uavs")).to_contain_text(says)
     go(page, "compare")
     page.get_by_role("button", name="Compare", exact=True).click()
     expect(page.locator(".task-picture rect.depot").first).to_be_attached()

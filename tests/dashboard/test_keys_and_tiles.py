@@ -114,9 +114,9 @@ def test_a_key_is_asked_for_kept_in_the_tab_and_told_to_nobody(visit, guarded):
     assert stored[1:] == [[], ""]
     kept = page.evaluate(
         """async () => {
-            const { mission, missions } = await import("/dashboard/js/keep.js");
-            const all = await missions();
-            return JSON.stringify([all, ...(await Promise.all(all.map(({ id }) => mission(id))))]);
+            const { keptProblem, keptProblems } = await import("/dashboard/js/keep.js");
+            const all = await keptProblems();
+            return JSON.stringify([all, ...(await Promise.all(all.map(({ id }) => keptProblem(id))))]);
         }"""
     )
     assert "cyclone-idai" in kept

@@ -31,28 +31,19 @@ def set_level(page, value, name="site-1"):
     page.keyboard.press("Enter")
 
 
-def at_a_moment(page, time="0.3"):
-    go(page, "field")
-    page.locator("#field-time").fill(time)
-    page.locator("#field-time").press("Tab")
-    page.get_by_label("mid-2 is lost").check()
-
-
-def test_problem_plan_and_clock_survive_a_reload(page, service):
+def test_problem_and_plan_survive_a_reload(page, service):
     ready(page)
     set_level(page, 0.25)
     answer = show_answer(page, service.url, algorithm="greedy")
-    at_a_moment(page)
-    kept = {key: state(page, key) for key in ("problem", "answer", "answerProblem", "mission", "colours")}
+    go(page, "answer")
+    kept = {key: state(page, key) for key in ("problem", "answer", "answerProblem", "colours")}
     page.wait_for_selector(KEPT)
 
     page.reload()
     ready(page)
 
     assert {key: state(page, key) for key in kept} == kept
-    assert f"#/field?job={answer['job_id']}" in page.url
-    expect(page.get_by_test_id("field-clock")).to_contain_text("0.3 of")
-    expect(page.get_by_label("mid-2 is lost")).to_be_checked()
+    assert f"#/answer?job={answer['job_id']}" in page.url
     go(page, "take-away")
     expect(page.locator("#stale-export")).to_be_hidden()
     page.locator("body").press("Control+z")
@@ -93,7 +84,7 @@ def test_a_tab_that_was_closed_comes_back_and_two_tabs_keep_their_own(page, serv
         ready(tab)
         assert level(tab) == value
     go(first, "recent")
-    rows = first.locator("[data-testid=kept-missions] tbody tr")
+    rows = first.locator("[data-testid=kept-problems] tbody tr")
     expect(rows).to_have_count(2)
     expect(rows.filter(has_text="this tab")).to_have_count(1)
     rows.get_by_role("button", name="Open").click()
@@ -174,15 +165,12 @@ def test_a_browser_that_keeps_nothing_says_so_and_asks(browser, service):
 
 
 @pytest.mark.parametrize("how", ["[data-example=paper-5x10]", "button:text-is('Empty')", "file"])
-def test_what_replaces_a_mission_can_be_undone(used, service, how):
+def test_what_replaces_a_problem_can_be_undone(used, service, how):
     page = used
     ready(page)
     set_level(page, 0.25)
     answer = show_answer(page, service.url, algorithm="greedy")
-    at_a_moment(page)
-    before = {
-        key: state(page, key) for key in ("problem", "problemName", "answer", "answerProblem", "mission")
-    }
+    before = {key: state(page, key) for key in ("problem", "problemName", "answer", "answerProblem")}
     go(page, "problem")
     if how == "file":
         content = json.dumps(example_problem("paper-5x10")).encode()
@@ -200,28 +188,6 @@ def test_what_replaces_a_mission_can_be_undone(used, service, how):
     assert {key: state(page, key) for key in before} == before
     go(page, "answer")
     expect(page.locator("[data-figure=Reward] data")).to_have_attribute("value", str(answer["reward"]))
-
-
-def test_undo_of_a_new_plan_brings_back_problem_plan_and_clock(used, service):
-    page = used
-    ready(page)
-    show_answer(page, service.url, algorithm="greedy")
-    at_a_moment(page)
-    keys = ("problem", "answer", "answerProblem", "mission")
-    before = {key: state(page, key) for key in keys}
-    page.locator("#view-field select[name=algorithm]").select_option("greedy")
-    page.get_by_role("button", name="Allocate again from here").click()
-    expect(page.get_by_test_id("field-changes")).to_be_visible()
-    after = {key: state(page, key) for key in keys}
-    assert len(after["problem"]["uavs"]) == len(before["problem"]["uavs"]) - 1
-
-    page.locator("body").press("Control+z")
-
-    assert {key: state(page, key) for key in keys} == before
-    expect(page.get_by_test_id("field-clock")).to_contain_text("0.3 of")
-    expect(page.get_by_test_id("field-changes")).to_have_count(0)
-    page.locator("body").press("Control+Shift+z")
-    assert {key: state(page, key) for key in keys} == after
 
 
 def test_a_plan_that_is_refused_leaves_the_one_before(page, service):

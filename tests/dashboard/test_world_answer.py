@@ -1,7 +1,7 @@
-"""Detours, zones, wind, waiting and names on the page, and a mission that follows them."""
+"""Detours, zones, wind, waiting and names on the page."""
 
 import pytest
-from dashboard_steps import go, open_problem, ready, show_answer, state
+from dashboard_steps import go, open_problem, ready, show_answer
 from page_modules import run_module
 from playwright.sync_api import expect
 
@@ -117,16 +117,6 @@ def test_the_table_and_the_timeline_say_who_waits(shown):
     expect(page.locator(".timeline button").first).to_have_text("Kestrel")
 
 
-def test_the_mission_follows_the_way(shown):
-    page, _ = shown
-    go(page, "field")
-    assert "Kestrel" in page.get_by_test_id("field-uavs").inner_text()
-    page.locator("#field-time").fill("8.5")
-    page.locator("#field-time").dispatch_event("change")
-    expect(page.get_by_test_id("field-uavs")).to_contain_text("to Village")
-    assert state(page, "mission")["clock"] == 8.5
-
-
 def test_a_plan_without_a_world_shows_nothing_of_it(page, service):
     ready(page)
     area = {"id": "a", "x": 8, "y": 0, **AREA}
@@ -139,56 +129,11 @@ def test_a_plan_without_a_world_shows_nothing_of_it(page, service):
         expect(page.locator(gone)).to_have_count(0)
 
 
-def test_what_a_uav_is_doing_by_the_answers_own_times():
+def test_when_something_happens_by_the_answers_own_times():
     """It waits on the ground from 1 to 4, flies for 5, serves until 9.5, waits again from 10 to 12."""
     code = """
-        const { allTimes, course, doingAt, homeward } = await load("times.js");
-        const times = allTimes(given.problem, given.answer);
-        const [uav] = given.problem.uavs;
-        return [
-            given.clocks.map((clock) => Object.values(doingAt(uav, times[0], clock))),
-            given.clocks.map((clock) => homeward(times[0], clock)),
-            course(given.problem, times),
-            [[1, 5], [0, 5], [1, 15]].map(([dis, clock]) => {
-                const stops = [{ id: "a", left: 5, arrival: 8, begin: 8, done: 8 }];
-                const none = { stops: [], home: 10 };
-                return [{ stops, home: 10 }, none].map((each) => doingAt({ ...uav, dis }, each, clock).doing);
-            }),
-        ];
+        const { allTimes, course } = await load("times.js");
+        return course(given.problem, allTimes(given.problem, given.answer));
     """
-    clocks = [3.0, 5.25, 9.25, 11.0, 12.0, 16.0, 20.0]
-    doing, homeward, course, aloft = run_module(code, {"problem": STILL, "answer": ANSWER, "clocks": clocks})
-    assert doing == [
-        ["waiting", "a"],
-        ["flying", "a"],
-        ["unloading", "a"],
-        ["waiting", "b"],
-        ["returning", None],
-        ["returning", None],
-        ["home", None],
-    ]
-    assert homeward == [False] * 5 + [True] * 2
-    assert course == {"begin": 1, "end": 20, "moments": [1, 9, 9.5, 10, 12, 20]}
-    # In the air when its plan begins, or on the ground; with a visit to make, or with none.
-    assert aloft == [["flying", "returning"], ["waiting", "idle"], ["home", "home"]]
-
-
-def test_the_clock_goes_on_and_so_do_all_times(page, service):
-    ready(page)
-    committed = {"uavs": [{**STILL["uavs"][0], "endurance": 30, "available_until": 40}]}
-    open_problem(page, {**STILL, **committed})
-    show_answer(page, service.url)
-    go(page, "field")
-    page.locator("#field-time").fill("7.5")
-    page.locator("#field-time").press("Tab")
-    page.locator("#view-field select[name=algorithm]").select_option("greedy")
-    page.get_by_role("button", name="Allocate again from here").click()
-    expect(page.get_by_test_id("field-changes")).to_be_visible()
-    now = state(page, "problem")
-    (uav,) = now["uavs"]
-    assert (uav["available_from"], uav["available_until"], uav["committed"]) == (7.5, 40, ["a"])
-    assert uav["airborne"] > 0
-    assert [area.get("earliest", 0) for area in now["targets"]] == [9, 12]
-    assert page.locator("#field-time").input_value() == "7.5"
-    drawn = page.locator("path.route").get_attribute("d")
-    assert drawn.count("L") > 2  # what is left of the way goes round the zone
+    found = run_module(code, {"problem": STILL, "answer": ANSWER})
+    assert found == {"begin": 1, "end": 20, "moments": [1, 9, 9.5, 10, 12, 20]}

@@ -128,7 +128,6 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
     """
     targets = {target.id: target for target in problem.targets}
     bases = {base.id: base for base in problem.bases}
-    places = _Places(problem, targets, bases)
     return FlownPlan(
         job_id=answer["job_id"],
         algorithm=answer.get("algorithm", _OWN_PLAN),
@@ -136,10 +135,7 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
         satisfaction=answer["satisfaction"],
         distance=answer["distance"],
         problem=problem,
-        routes=tuple(
-            FlownRoute(number, uav, route["distance"], tuple(_flights(number, uav, route, places)))
-            for number, (uav, route) in enumerate(zip(problem.uavs, answer["routes"], strict=True))
-        ),
+        routes=flown_routes(problem, answer["routes"]),
         unmet=tuple(
             UnmetNeed(targets[each["target_id"]], tuple(each["remaining"]), each["reason"])
             for each in answer["unmet"]
@@ -149,6 +145,17 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
             StockLeft(bases[each["base_id"]], None if each["stock"] is None else tuple(each["stock"]))
             for each in answer.get("bases") or ()
         ),
+    )
+
+
+def flown_routes(problem: Problem, routes: Sequence[Mapping[str, Any]]) -> tuple[FlownRoute, ...]:
+    """Join a problem and the routes of a plan, one a UAV, as answers have them."""
+    targets = {target.id: target for target in problem.targets}
+    bases = {base.id: base for base in problem.bases}
+    places = _Places(problem, targets, bases)
+    return tuple(
+        FlownRoute(number, uav, route["distance"], tuple(_flights(number, uav, route, places)))
+        for number, (uav, route) in enumerate(zip(problem.uavs, routes, strict=True))
     )
 
 

@@ -155,6 +155,20 @@ def mission(flight: Flight, choices: FlightChoices) -> tuple[MissionItem, ...]:
     return items
 
 
+def mission_with_home(flight: Flight, choices: FlightChoices) -> tuple[MissionItem, ...]:
+    """Return the same with the home position as item 0, as ArduPilot numbers missions.
+
+    It is in the global frame, since no other altitude is measured from anything else.
+
+    Raises
+    ------
+    OutOfRange
+        As :func:`mission` does.
+    """
+    home = MissionItem(Command.WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), (*flight.launch, 0.0))
+    return (home, *mission(flight, choices))
+
+
 def speed_m_s(flight: Flight) -> float:
     """Return a UAV's speed; the problem's is in km/h."""
     return flight.uav.speed / 3.6

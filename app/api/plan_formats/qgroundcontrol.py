@@ -10,11 +10,10 @@ from typing import Any
 from app.api.plan_formats.flights import Flight, FlownReload
 from app.api.plan_formats.mission import (
     AltitudeReference,
-    Command,
     FlightChoices,
-    Frame,
     MissionItem,
     mission,
+    mission_with_home,
     speed_m_s,
 )
 from app.domain.surroundings import NoFlyZone
@@ -80,17 +79,15 @@ def _notes(flight: Flight) -> list[str]:
 
 
 def waypoint_file(flight: Flight, choices: FlightChoices) -> str:
-    """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots
-    expect: in the global frame, since no other altitude is measured from anything else.
+    """Write waypoints as ``QGC WPL 110``; line 0 is the home position, as autopilots expect.
 
     Raises
     ------
     OutOfRange
         As :func:`~app.api.plan_formats.mission.mission` does.
     """
-    home = MissionItem(Command.WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), (*flight.launch, 0.0))
     lines = ["QGC WPL 110"]
-    for number, item in enumerate((home, *mission(flight, choices))):
+    for number, item in enumerate(mission_with_home(flight, choices)):
         longitude, latitude, altitude = item.place or (0.0, 0.0, 0.0)
         # Ground stations and autopilots that read this format read no NaN: 0 is its "leave it as it is".
         params = [0.0 if math.isnan(value) else value for value in item.params]

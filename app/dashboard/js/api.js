@@ -105,34 +105,64 @@ export async function changed(path, etag) {
   return { etag: response.headers.get("ETag"), body: response.status === 304 ? null : await response.blob() };
 }
 
+/** Whether what went wrong may pass by itself, so that the same can be asked again. */
+export function mayPass(error) {
+  return !(error instanceof ApiError) || PASSING.has(error.status);
+}
+
 /**
- * Follow a job's events to its end, going on after the last one seen where the connection breaks or the service is
- * started again, and read the job.
+ * Listen to server-sent events, going on after the last one seen where the connection breaks or the service is started
+ * again.
+ * @param {string} path
+ * @param {(event: {name: string, id: string | null, data: string}) => boolean | void} heard true: it was the last one
+ * @param {{last?: string | null, opened?: () => void, lost?: () => void, signal?: AbortSignal}} [options] `last` is the id of the last
+ *   event that is known; `opened` is called each time there is a connection, `lost` each time there is none any more
+ * @returns {Promise<void>} at the last event, or where the signal is aborted
+ * @throws {ApiError} where the service refuses
+ */
+export async function listen(path, heard, { last = null, opened = () => {}, lost = () => {}, signal } = {}) {
+  for (;;) {
+    try {
+      const response = await send(path, { signal, headers: last === null ? {} : { "Last-Event-ID": last } });
+      opened();
+      for await (const event of events(response.body)) {
+        last = event.id ?? last;
+        if (heard(event)) return;
+      }
+    } catch (error) {
+      if (!signal?.aborted && !mayPass(error)) throw error;
+    }
+    if (signal?.aborted) return;
+    lost();
+    await pause();
+  }
+}
+
+function pause() {
+  return new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+}
+
+/**
+ * Follow a job's events to its end, and read the job.
  * @param {string} id of the job
- * @param {(data: object) => void} listen
+ * @param {(data: object) => void} tell
  * @param {() => void} [lost] called each time the service is not there
  * @returns {Promise<object>} the job at its end
  */
-export async function follow(id, listen, lost = () => {}) {
-  let last = null;
-  for (let ended = false; ; ) {
+export async function follow(id, tell, lost = () => {}) {
+  const heard = ({ name, data }) => {
+    if (data) tell(JSON.parse(data));
+    return name === "end";
+  };
+  await listen(`jobs/${id}/events`, heard, { lost });
+  for (;;) {
     try {
-      if (ended) return await json(`jobs/${id}`);
-      const response = await send(`jobs/${id}/events`, { headers: last ? { "Last-Event-ID": last } : {} });
-      for await (const event of events(response.body)) {
-        last = event.id ?? last;
-        if (event.data) listen(JSON.parse(event.data));
-        if (event.name === "end") {
-          ended = true;
-          break;
-        }
-      }
-      if (ended) continue;
+      return await json(`jobs/${id}`);
     } catch (error) {
-      if (error instanceof ApiError && !PASSING.has(error.status)) throw error;
+      if (!mayPass(error)) throw error;
     }
     lost();
-    await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+    await pause();
   }
 }
 

@@ -52,5 +52,8 @@ export function coloured(before, uavs) {
 
 /** Keep the store's colours. */
 export function keepColours() {
-  subscribe(["problem"], ({ problem, colours }) => set({ colours: coloured(colours, problem.uavs) }));
+  subscribe(["problem", "openMission"], ({ problem, openMission, colours }) => {
+    const own = coloured(colours, problem?.uavs ?? []);
+    set({ colours: coloured(own, openMission?.head?.state.problem.uavs ?? []) });
+  });
 }

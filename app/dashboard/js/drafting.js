@@ -1,5 +1,5 @@
 /**
- * The plan on screen while it is changed by hand: each change is a step of undo, kept with the mission, and judged by
+ * The plan on screen while it is changed by hand: each change is a step of undo, kept with the problem, and judged by
  * the service. The store's `draft` is null, or `{visits, evaluation, refusal, trouble}`: what the UAVs visit, and one of
  * the answer, the rules that are broken, and why the service has not said yet; all null while it is asked.
  */
@@ -7,7 +7,7 @@
 import { assignmentOf, visitsFor, visitsOf } from "./draft.js";
 import { evaluate } from "./evaluation.js";
 import { change } from "./history.js";
-import { BEGINNING, get, set, subscribe } from "./state.js";
+import { get, set, subscribe } from "./state.js";
 
 const UNJUDGED = { evaluation: null, refusal: null, trouble: null };
 let asking = null;
@@ -31,7 +31,7 @@ export function judgeAgain() {
 /** Make it the plan on screen. */
 export function keepDraft() {
   const { draft } = get();
-  change({ answer: draft.evaluation, mission: BEGINNING, incumbent: null, draft: null });
+  change({ answer: draft.evaluation, incumbent: null, draft: null });
 }
 
 /** Go back to the plan as it was; undoing brings the change back. */

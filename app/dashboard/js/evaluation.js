@@ -9,13 +9,13 @@ const ILLEGAL = "illegal-plan";
  * Evaluate a plan.
  * @param {object} problem
  * @param {number[][]} assignment joint actions
- * @param {{at?: number, signal?: AbortSignal}} [options] at a clock of the plan the answer has what remains then
+ * @param {{signal?: AbortSignal}} [options]
  * @returns {Promise<{answer: object} | {refusal: {detail: string, breaches: object[]}}>} an answer, or what is wrong with the plan
  * @throws {ApiError} where the service does not say
  */
-export async function evaluate(problem, assignment, { at, signal } = {}) {
+export async function evaluate(problem, assignment, { signal } = {}) {
   try {
-    return { answer: await json("evaluate", { method: "POST", body: { ...problem, assignment, at }, signal }) };
+    return { answer: await json("evaluate", { method: "POST", body: { ...problem, assignment }, signal }) };
   } catch (error) {
     if (!(error instanceof ApiError) || error.problem.type !== ILLEGAL) throw error;
     return { refusal: { detail: error.message, breaches: error.problem.breaches ?? [] } };

@@ -43,9 +43,12 @@ function setError(place, detail) {
   shown.hidden = !detail;
 }
 
+let labels = 0;
+
 /** A labelled place for an input, where a refusal of its pointer is shown. */
 export function labelled(title, input, { pointer, hint } = {}) {
-  const id = `error-${pointer?.replaceAll("/", "-")}`;
+  labels += 1;
+  const id = `error-${labels}`;
   input.setAttribute("aria-describedby", id);
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }

@@ -1,10 +1,10 @@
-/** Undo and redo: a step holds what belongs together, the problem, its plan, the clock of the mission and the colours. */
+/** Undo and redo: a step holds what belongs together, the problem, its plan and the colours. */
 
 import { notify } from "./dom.js";
-import { BEGINNING, get, set } from "./state.js";
+import { get, set } from "./state.js";
 
 const MOST_UNDONE = 100;
-const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "draft", "mission", "colours"];
+const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "draft", "colours"];
 
 /** What is on screen, as a step. */
 export function present() {
@@ -23,7 +23,7 @@ export function change(patch) {
 
 /** Bring a plan on screen, with the problem that it answers. @param {object} [rest] of the store */
 export function showPlan(problem, answer, rest = {}) {
-  const shown = { answer, answerProblem: problem, incumbent: null, mission: BEGINNING, ...rest };
+  const shown = { answer, answerProblem: problem, incumbent: null, ...rest };
   // A first plan takes nothing away: what is undone then is the newest edit.
   const aside = get().draft;
   if (get().answer || ("problem" in rest && rest.problem !== get().problem)) change(shown);

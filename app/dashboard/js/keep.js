@@ -1,19 +1,21 @@
 /**
- * Missions in the browser's own store: what is on screen survives a reload, a crash and a closed tab.
+ * Problems with their plans in the browser's own store: what is on screen survives a reload, a crash and a closed tab.
+ * Missions are the service's, and are not kept here.
  *
- * Each tab has a mission of its own. A record names the page that wrote it last: a page that finds another's name there
+ * Each tab has a problem of its own. A record names the page that wrote it last: a page that finds another's name there
  * (the tab was duplicated) goes on under a new id, so that none overwrites the other's.
  */
 
 import { present } from "./history.js";
 import { get, subscribe } from "./state.js";
 
+// The names in the browser's store stay as they were, so that what was kept there is found.
 const DATABASE = "dispatch";
 const VERSION = 1;
 const TAB = "dispatch-mission";
-const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "draft", "mission", "colours", "job", "past", "future"];
+const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "draft", "colours", "job", "past", "future"];
 const STEPS_KEPT = 20;
-const MISSIONS_KEPT = 20;
+const PROBLEMS_KEPT = 20;
 const REST_MS = 200;
 
 const page = `${Date.now()} ${Math.random()}`;
@@ -55,20 +57,20 @@ function newId() {
   sessionStorage.setItem(TAB, id);
 }
 
-/** Labels of the missions there are, newest first. @returns {Promise<object[]>} `{id, savedAt, name, uavs, areas, reward}` */
-export async function missions() {
+/** Labels of the problems there are, newest first. @returns {Promise<object[]>} `{id, savedAt, name, uavs, areas, reward}` */
+export async function keptProblems() {
   if (!database) return [];
   const all = await done(database.transaction("labels").objectStore("labels").getAll());
   return all.sort((a, b) => b.savedAt - a.savedAt);
 }
 
-/** What a mission was, as keys of the page's store; null where it is not there any more. */
-export async function mission(wanted) {
+/** What a kept problem was, with its plan, as keys of the page's store; null where it is not there any more. */
+export async function keptProblem(wanted) {
   const record = await done(database.transaction("missions").objectStore("missions").get(wanted));
   return record?.state ?? null;
 }
 
-/** Whether a mission is the one of this tab. */
+/** Whether a kept problem is the one of this tab. */
 export function isOwn(wanted) {
   return wanted === id;
 }
@@ -80,7 +82,7 @@ export async function forget(wanted) {
 }
 
 /**
- * Find the mission of this tab, or for a new tab a copy of the newest; from then on each change is kept.
+ * Find the problem of this tab, or for a new tab a copy of the newest; from then on each change is kept.
  * @param {(why: string) => void} onFailure is told once where the browser keeps nothing
  * @returns {Promise<object | null>} keys of the page's store; null where nothing was kept
  */
@@ -93,11 +95,11 @@ export async function restore(onFailure) {
   try {
     database = await openDatabase();
     id = sessionStorage.getItem(TAB);
-    state = id && (await mission(id));
+    state = id && (await keptProblem(id));
     if (!state) {
       newId();
-      const [newest] = await missions();
-      state = newest ? await mission(newest.id) : null;
+      const [newest] = await keptProblems();
+      state = newest ? await keptProblem(newest.id) : null;
     } else await claim();
   } catch (error) {
     failed(error);
@@ -116,7 +118,7 @@ async function claim() {
 }
 
 /** Keep what is on screen from now on. */
-export function keepMission() {
+export function keepProblem() {
   let followed = null;
   subscribe(KEPT_KEYS, ({ job }, keys) => {
     const now = `${job?.id} ${job?.status}`;
@@ -142,7 +144,7 @@ function mark() {
   document.documentElement.dataset.kept = String(changed === kept);
 }
 
-/** Keep it, one after the other and with a rest between: a clock that runs changes it all the time. */
+/** Keep it, one after the other and with a rest between. */
 function save() {
   saving ??= (async () => {
     while (changed !== kept) {
@@ -195,7 +197,7 @@ async function put(state) {
   return written;
 }
 
-/** Have only the newest missions. */
+/** Have only the newest ones. */
 async function thinOut() {
-  for (const { id: old } of (await missions()).slice(MISSIONS_KEPT)) if (old !== id) await forget(old);
+  for (const { id: old } of (await keptProblems()).slice(PROBLEMS_KEPT)) if (old !== id) await forget(old);
 }

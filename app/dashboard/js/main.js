@@ -7,8 +7,11 @@ import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
 import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
-import { keepMission, restore } from "./keep.js";
+import { keepProblem, restore } from "./keep.js";
 import { DispatchMap } from "./map.js";
+import { lastOpen, openMission } from "./missions/feed.js";
+import { keepUntold } from "./missions/outbox.js";
+import { goOn } from "./missions/pace.js";
 import { open } from "./problem.js";
 import { openPlan } from "./recent.js";
 import { allViews } from "./registry.js";
@@ -183,7 +186,7 @@ async function load() {
 /** Bring back what this tab showed last; a job that was under way is followed on. */
 async function comeBack() {
   const kept = await restore((why) => notify(`This browser keeps nothing (${why}): export what you need before you leave.`, "error"));
-  keepMission();
+  keepProblem();
   if (!kept) return;
   set(kept);
   if (running(kept.job)) kept.job.id ? void resume(kept.job.id, kept.problem, kept.job.algorithm) : set({ job: null });
@@ -204,6 +207,7 @@ async function start() {
   subscribe(["problem", "problemName"], titleProblem);
   keepColours();
   judgeDrafts();
+  keepUntold();
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();
@@ -211,11 +215,14 @@ async function start() {
   await comeBack();
   await load();
   if (!get().problem) open({}, "New problem");
+  const mission = asked?.view === "missions" ? asked.mission : lastOpen();
+  if (mission) openMission(mission);
+  goOn();
   subscribe(["view"], ({ view }) => show(view));
   document.addEventListener("visibilitychange", watchService);
   void watchService();
   show(get().view);
-  keepAddress((job) => void openFromAddress(job));
+  keepAddress((job) => void openFromAddress(job), openMission);
   if (asked?.job && asked.job !== get().answer?.job_id) await openFromAddress(asked.job);
   document.documentElement.dataset.ready = "true";
 }

@@ -46,16 +46,16 @@ export class DispatchMap {
     element.addEventListener("keydown", (event) => this.#onKey(event));
   }
 
-  /** Draw a plan instead of the store's. @param {object|null} problem null: back to the store's */
-  showPlan(problem, plan = null) {
-    this.given = problem && { problem, plan };
+  /** Draw a plan instead of the store's. @param {object|null} problem null: back to the store's @param {{underWay?: boolean}} [options] whether legs that UAVs are on stand out */
+  showPlan(problem, plan = null, { underWay = false } = {}) {
+    this.given = problem && { problem, plan, underWay };
     this.#onProblem(problem ?? get().problem);
   }
 
-  /** The next click, or Enter on the map for its middle, places one. @param {"uavs"|"targets"|"bases"} kind @param {() => void} [ended] */
-  startPlacing(kind, ended = () => {}) {
+  /** The next click, or Enter on the map for its middle, places one. @param {"uavs"|"targets"|"bases"} kind @param {() => void} [ended] @param {(kind: string, at: {x, y}) => void} [take] takes it; the problem on screen otherwise */
+  startPlacing(kind, ended = () => {}, take = place) {
     this.stopPlacing();
-    this.placing = { kind, ended };
+    this.placing = { kind, ended, take };
     this.element.classList.add("placing");
   }
 
@@ -66,14 +66,14 @@ export class DispatchMap {
     this.drawing?.giveUp();
   }
 
-  /** Draw a zone: clicks, and Space for the middle of the map, are its corners. @param {(drawing: ZoneDrawing | null) => void} changed is told of each corner; null: it has ended */
-  drawZone(changed) {
+  /** Draw a zone: clicks, and Space for the middle of the map, are its corners. @param {(drawing: ZoneDrawing | null) => void} changed is told of each corner; null: it has ended @param {(polygon: number[][]) => void} [take] takes it; the problem on screen otherwise */
+  drawZone(changed, take = addZone) {
     this.stopPlacing();
     this.drawing = new ZoneDrawing(this.map, {
       ...this.#places(), fewest: fewestCorners(), changed: () => changed(this.drawing),
       ended: (polygon) => {
         this.drawing = null;
-        if (polygon) addZone(polygon);
+        if (polygon) take(polygon);
         changed(null);
       },
     });
@@ -180,13 +180,13 @@ export class DispatchMap {
   }
 
   #draw() {
-    const { problem, plan, planned = problem } = this.#shown();
+    const { problem, plan, planned = problem, underWay = false } = this.#shown();
     if (!this.map || !problem) return;
     clearTimeout(this.later);
     this.later = null;
     const began = performance.now();
     if (this.drawn?.plan !== plan || this.drawn?.planned !== planned || this.drawn?.uavs !== problem.uavs || this.drawn?.shift !== this.shift || this.drawn?.routes !== this.routes) {
-      this.routes.draw(planned, plan, problem, (point) => this.#latLng(point));
+      this.routes.draw(planned, plan, problem, (point) => this.#latLng(point), underWay);
       this.drawn = { plan, planned, uavs: problem.uavs, shift: this.shift, routes: this.routes };
     }
     this.air.draw(problem, (point) => this.#latLng(point), this.shift);
@@ -336,7 +336,7 @@ export class DispatchMap {
 
   #onClick(latlng, event = null) {
     if (this.drawing) return this.drawing.add(latlng);
-    if (this.placing) return place(this.placing.kind, this.#rounded(latlng));
+    if (this.placing) return this.placing.take(this.placing.kind, this.#rounded(latlng));
     // The second click of the double click that ended a zone means nothing more.
     if (!(event?.detail > 1)) select(null);
   }
@@ -369,7 +369,10 @@ export class DispatchMap {
 
   #onKey(event) {
     if (this.drawing && event.target === this.element) return this.#onDrawingKey(event);
-    if (event.key === "Enter" && this.placing && event.target === this.element) return this.#onClick(this.map.getCenter());
+    if (event.key === "Enter" && this.placing && event.target === this.element) {
+      event.preventDefault(); // a form that opens then is not sent by the same key
+      return this.#onClick(this.map.getCenter());
+    }
     const { selection } = get();
     if (!selection || !this.#editable() || this.drawing) return;
     if (event.key === "Delete") remove(selection.kind, selection.id);

@@ -90,16 +90,17 @@ function wayHome(problem, uav, landing) {
 }
 
 /**
- * How much of what each area asked for it has, with what an answer brings, 0 to 1; an area that needs nothing is met.
+ * How much of what each area asked for it has, with what an answer brings if it says so, 0 to 1; an area that needs nothing
+ * is met.
  * @returns {Map<string, number>} by target id
  */
 export function met(problem, answer) {
-  const remaining = new Map((answer?.unmet ?? []).map((each) => [each.target_id, sum(each.remaining)]));
+  const remaining = answer?.unmet && new Map(answer.unmet.map((each) => [each.target_id, sum(each.remaining)]));
   return new Map(
     problem.targets.map((target) => {
       const requested = sum(requestedBy(target));
       if (requested === 0) return [target.id, 1];
-      return [target.id, 1 - (answer ? (remaining.get(target.id) ?? 0) : sum(target.loadlist)) / requested];
+      return [target.id, 1 - (remaining ? (remaining.get(target.id) ?? 0) : sum(target.loadlist)) / requested];
     }),
   );
 }

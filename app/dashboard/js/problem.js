@@ -5,7 +5,7 @@ import { change } from "./history.js";
 import { BASES, STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
 import { amountsOf, itemFields } from "./schema.js";
-import { BEGINNING, get, select, set } from "./state.js";
+import { get, select, set } from "./state.js";
 
 /** A problem with ids filled in and what is not set left out. */
 export function normalised({ uavs = [], targets = [], ...settings }) {
@@ -40,11 +40,11 @@ export function materials(problem) {
   return (problem.uavs[0] ?? problem.targets[0])?.loadlist.length ?? 1;
 }
 
-/** Bring another problem on screen; undoing brings back the one before with its plan and clock. */
+/** Bring another problem on screen; undoing brings back the one before with its plan. */
 export function open(problem, name) {
   change({
     problem: normalised(problem), problemName: name, opened: newOpening(), colours: {},
-    answer: null, answerProblem: null, mission: BEGINNING, incumbent: null, selection: null,
+    answer: null, answerProblem: null, incumbent: null, selection: null,
   });
 }
 

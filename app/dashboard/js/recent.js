@@ -4,7 +4,7 @@ import { resume } from "./allocation.js";
 import { json } from "./api.js";
 import { change, showPlan } from "./history.js";
 import { newOpening, normalised } from "./problem.js";
-import { BEGINNING, get } from "./state.js";
+import { get } from "./state.js";
 
 const KINDS = new Set(["allocate", "batch"]);
 /** Plans that are listed at least, where there are as many. */
@@ -18,7 +18,7 @@ const ENDED = new Set(["succeeded", "failed", "cancelled"]);
  */
 export async function recentPlans(cursor = null) {
   const jobs = [];
-  // A mission that is looked at moment by moment leaves many jobs of another kind between the plans.
+  // Missions leave many jobs of another kind between the plans.
   do {
     const page = await json(`jobs?limit=100${cursor ? `&cursor=${encodeURIComponent(cursor)}` : ""}`);
     jobs.push(...page.jobs.filter(({ kind }) => KINDS.has(kind)));
@@ -37,6 +37,6 @@ export async function openPlan(id) {
   const opening = { problem, problemName: `Plan ${id.slice(0, 8)}`, opened: newOpening(), colours: {}, selection: null };
   if (job.result?.routes) return showPlan(problem, job.result, opening);
   if (ENDED.has(job.status) || !KINDS.has(job.kind)) throw new Error(`job ${id} (${job.kind}, ${job.status}) has no plan`);
-  change({ ...opening, answer: null, answerProblem: null, mission: BEGINNING, incumbent: null });
+  change({ ...opening, answer: null, answerProblem: null, incumbent: null });
   void resume(id, get().problem);
 }

@@ -26,8 +26,9 @@ export class Routes {
    * @param {object | number[][] | null} plan
    * @param {object} present the problem on screen, which says which visits are locked
    * @param {(point: {x, y}) => number[]} latLng where a position is drawn
+   * @param {boolean} [underWay] whether the way to what a UAV is committed to stands out
    */
-  draw(problem, plan, present, latLng) {
+  draw(problem, plan, present, latLng, underWay = false) {
     this.layers.clearLayers();
     const routes = routesOf(problem, plan);
     const uavs = new Map(present.uavs.map((uav) => [uav.id, uav]));
@@ -44,11 +45,20 @@ export class Routes {
         paint(path, uav.id);
         Object.assign(path.dataset, { uavId: uav.id, flight: number, stops: visits.map(({ item }) => item.id).join("\n") });
       }
+      const locked = lockedCount(uavs.get(uav.id), places);
+      if (underWay && locked) this.#drawCommitted(uav, flights[0].points, visits[locked - 1].item, latLng);
       if (stops <= FEW_STOPS) {
-        const locked = lockedCount(uavs.get(uav.id), places);
         visits.forEach(({ item }, at) => this.#drawOrder({ uav, index, item, at, locked: at < locked }, latLng));
       }
     }
+  }
+
+  /** The way to the last stop that a UAV is committed to. */
+  #drawCommitted(uav, points, { x, y }, latLng) {
+    const end = points.findIndex((point, n) => n > 0 && point.x === x && point.y === y);
+    const line = L.polyline(points.slice(0, end + 1).map(latLng), { renderer: this.renderer, className: "committed", interactive: false, weight: 8, smoothFactor: 0.5 });
+    this.layers.addLayer(line);
+    paint(line.getElement(), uav.id).dataset.uavId = uav.id;
   }
 
   #drawOrder({ uav, index, item, at, locked }, latLng) {

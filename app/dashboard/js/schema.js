@@ -10,8 +10,9 @@ export function resolved(schema, defs) {
 /**
  * The fields of a problem, and the algorithms that learn.
  * @param {object} openapi the document
- * @returns {{learners: string[], uavs: object, targets: object, settings: object, request: object}} JSON schemas by name, references
- *   taken out: of a UAV, of an area (`needed`: it has no default), of the problem besides its lists, and of `POST /allocate` besides the problem
+ * @returns {{learners: string[], uavs: object, targets: object, settings: object, request: object, mission: object}} JSON schemas by name,
+ *   references taken out: of a UAV, of an area (`needed`: it has no default), of the problem besides its lists, and of `POST /allocate` and
+ *   `POST /missions` besides the problem
  */
 export function fieldsOf(openapi) {
   const defs = openapi.components.schemas;
@@ -27,7 +28,8 @@ export function fieldsOf(openapi) {
     else if (schema.items?.$ref) settings[name] = { ...schema, items: { properties: item(schema) } };
   }
   const learners = defs.TrainingModel.properties.algorithm.enum;
-  return { learners, uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request) };
+  const { problem: _, ...mission } = all(defs.MissionRequest.properties);
+  return { learners, uavs: item(uavs), targets: item(targets), settings, request: Object.fromEntries(request), mission };
 }
 
 /** JSON schemas of the fields of an item of a list of the problem. @param {object} fields as `fieldsOf` gives them */

@@ -4,9 +4,6 @@
  * Keys are listed in README.md.
  */
 
-/** A mission at the beginning of its plan: nothing has happened yet. */
-export const BEGINNING = Object.freeze({ clock: 0, lost: [], happened: {}, found: [], recall: false, outcome: null });
-
 const listeners = new Set();
 
 let state = Object.freeze({
@@ -20,7 +17,8 @@ let state = Object.freeze({
   answer: null,
   answerProblem: null,
   draft: null,
-  mission: BEGINNING,
+  openMission: null,
+  untold: [],
   incumbent: null,
   violations: [],
   selection: null,

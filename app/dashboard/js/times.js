@@ -1,6 +1,6 @@
 /** When the UAVs of a plan do what, by the answer's own times. */
 
-import { stateOf, waiting } from "./plan.js";
+import { waiting } from "./plan.js";
 import { flightsOf, isReload, placeOf } from "./stops.js";
 
 /** When a UAV leaves for each stop, arrives, begins and is done there, when it waits, and when it is home. */
@@ -38,25 +38,4 @@ export function course(problem, times) {
   }
   const moments = [...all].filter((at) => at >= begin).sort((a, b) => a - b);
   return { begin, end: moments.at(-1), moments };
-}
-
-/** Whether a UAV has made all its visits by a clock, and flies home or is back. */
-export function homeward({ stops }, clock) {
-  return stops.length > 0 && clock > stops.at(-1).done;
-}
-
-/**
- * What a UAV is doing at a clock.
- * @returns {{doing: "idle" | "waiting" | "flying" | "unloading" | "reloading" | "returning" | "home", next: string | null}} `next` is the place
- */
-export function doingAt(uav, { stops, home }, clock) {
-  const aloft = stateOf(uav) !== "at its base";
-  for (const [n, { id, left, begin, arrival, done, loaded }] of stops.entries()) {
-    // At the very moment it leaves it flies only where it was in the air before.
-    if (clock < arrival) return { doing: clock > left || (clock === left && (n > 0 ? !stops[n - 1].loaded : aloft)) ? "flying" : "waiting", next: id };
-    if (clock < begin) return { doing: "waiting", next: id };
-    if (clock < done) return { doing: loaded ? "reloading" : "unloading", next: id };
-  }
-  if (!stops.length && !aloft) return { doing: "idle", next: null };
-  return { doing: clock < home ? "returning" : "home", next: null };
 }

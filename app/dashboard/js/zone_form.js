@@ -12,15 +12,16 @@ const MANY = 200;
 /**
  * The button that begins a zone, and what can be done while it is drawn, for those who have no keys or no pointer.
  * @param {object} map
+ * @param {{id?: string, take?: (polygon: number[][]) => void}} [options] id of the steps, and what takes the zone; the problem on screen otherwise
  * @returns {{button: HTMLElement, steps: HTMLElement}}
  */
-export function drawingControls(map) {
+export function drawingControls(map, { id = "drawing", take } = {}) {
   let drawing = null;
-  const says = h("p", { class: "hint", role: "status", id: "drawing-says" });
+  const says = h("p", { class: "hint", role: "status", id: `${id}-says` });
   const step = (title, key, act) => h("button", { type: "button", title: key, onclick: () => { if (drawing) act(); } }, title);
   const finish = step("Finish the zone", "Enter", () => drawing.finish());
   const back = step("Take a corner back", "Backspace", () => drawing.takeBack());
-  const steps = h("div", { class: "block", hidden: true, id: "drawing" },
+  const steps = h("div", { class: "block", hidden: true, id },
     h("p", { class: "hint" }, "Click a corner after the other; end with the first corner again, a double click or Enter. Escape gives up. By keyboard: arrows move the map, Space sets a corner in its middle."),
     says,
     h("div", { class: "row" }, step("Corner in the middle of the map", "Space", () => drawing.addMiddle()), back, finish, step("Give up", "Escape", () => drawing.giveUp())));
@@ -32,10 +33,10 @@ export function drawingControls(map) {
     says.classList.toggle("error", now?.crosses ?? false);
     back.disabled = !now?.corners.length;
   };
-  const button = h("button", { type: "button", "aria-pressed": "false", dataset: { draw: "zone" }, onclick: () => {
+  const button = h("button", { type: "button", "aria-pressed": "false", dataset: { draw: take ? "mission-zone" : "zone" }, onclick: () => {
     if (drawing) return drawing.giveUp();
     if (!get().fields) return notify("The service has not said yet what a zone is", "error");
-    map.drawZone(changed);
+    map.drawZone(changed, take);
     map.element.focus();
   } }, "Draw a zone");
   return { button, steps };

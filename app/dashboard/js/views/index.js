@@ -4,7 +4,7 @@ import "./problem.js";
 import "./allocate.js";
 import "./answer.js";
 import "./compare.js";
-import "./field.js";
+import "./missions.js";
 import "./library.js";
 import "./take_away.js";
 import "./recent.js";

@@ -1,8 +1,8 @@
-/** Recent plans: those of the service, and the missions that this browser has kept; each can be opened again. */
+/** Recent plans: those of the service, and the problems that this browser has kept; each can be opened again. */
 
 import { h, notify, number } from "../dom.js";
 import { change, undo } from "../history.js";
-import { forget, isOwn, mission, missions } from "../keep.js";
+import { forget, isOwn, keptProblem, keptProblems } from "../keep.js";
 import { newOpening } from "../problem.js";
 import { openPlan, recentPlans } from "../recent.js";
 import { registerView } from "../registry.js";
@@ -18,27 +18,27 @@ function mount(root) {
   const head = (titles) => h("thead", {}, h("tr", {}, titles.map((title) => h("th", { scope: "col" }, title))));
   parts = {
     plans: h("tbody", {}),
-    missions: h("tbody", {}),
+    problems: h("tbody", {}),
     status: h("p", { class: "muted", role: "status", "data-testid": "recent-status" }),
     more: h("button", { type: "button", hidden: true, onclick: () => void said(next) }, "Show more"),
     cursor: null,
   };
   root.append(
-    h("h2", {}, "Recent plans and missions"),
+    h("h2", {}, "Recent plans and problems"),
     h("p", { class: "muted lead" }, "What is opened takes the place of what is on screen; Undo brings that back."),
     h("section", { class: "card" }, h("h3", {}, "Plans of the service"), parts.status,
       h("div", { class: "scroll" }, h("table", { "data-testid": "recent-plans" }, head(["Open", "Asked for", "Job", "State", "Reward"]), parts.plans)),
       h("p", { class: "actions" }, parts.more)),
-    h("section", { class: "card" }, h("h3", {}, "Missions of this browser"),
-      h("p", { class: "muted" }, "Each tab keeps its own: problem, plan and clock."),
-      h("div", { class: "scroll" }, h("table", { "data-testid": "kept-missions" }, head(["Open", "Kept", "Problem", "Size", "Reward"]), parts.missions))));
+    h("section", { class: "card" }, h("h3", {}, "Problems of this browser"),
+      h("p", { class: "muted" }, "Each tab keeps its own, with its plan and the steps to undo."),
+      h("div", { class: "scroll" }, h("table", { "data-testid": "kept-problems" }, head(["Open", "Kept", "Problem", "Size", "Reward"]), parts.problems))));
 }
 
 async function load() {
   parts.plans.replaceChildren();
   parts.cursor = null;
   await said(next);
-  await said(listMissions);
+  await said(listProblems);
 }
 
 /** The next page of plans. */
@@ -65,16 +65,16 @@ function planRow(job) {
     h("td", {}, number(job.progress.best_reward)));
 }
 
-async function listMissions() {
-  const all = await missions();
-  parts.missions.replaceChildren(...all.map(missionRow));
-  if (!all.length) parts.missions.append(h("tr", {}, h("td", { colspan: "5" }, "None yet.")));
+async function listProblems() {
+  const all = await keptProblems();
+  parts.problems.replaceChildren(...all.map(problemRow));
+  if (!all.length) parts.problems.append(h("tr", {}, h("td", { colspan: "5" }, "None yet.")));
 }
 
-function missionRow({ id, savedAt, name, uavs, areas, reward }) {
+function problemRow({ id, savedAt, name, uavs, areas, reward }) {
   const open = () => said(async () => {
-    const { job: _j, past: _p, future: _f, ...step } = (await mission(id)) ?? {};
-    if (!step.problem) return listMissions();
+    const { job: _j, past: _p, future: _f, ...step } = (await keptProblem(id)) ?? {};
+    if (!step.problem) return listProblems();
     change({ ...step, opened: newOpening(), incumbent: null, selection: null });
     offerBack(`${name} is open, as a copy`);
     set({ view: step.answer ? "answer" : "problem" });
@@ -82,9 +82,9 @@ function missionRow({ id, savedAt, name, uavs, areas, reward }) {
   const drop = () => said(async () => {
     if (!confirm(`Forget ${name}?`)) return;
     await forget(id);
-    await listMissions();
+    await listProblems();
   });
-  return h("tr", { dataset: { mission: id } },
+  return h("tr", { dataset: { kept: id } },
     h("td", {}, isOwn(id) ? h("span", { class: "chip" }, "this tab")
       : [h("button", { type: "button", "aria-label": `Open ${name}`, onclick: open }, "Open"), " ", h("button", { type: "button", class: "quiet", "aria-label": `Forget ${name}`, onclick: drop }, "Forget")]),
     h("td", {}, WHEN.format(new Date(savedAt))), h("td", {}, name), h("td", {}, `${uavs} UAVs, ${areas} areas`), h("td", {}, number(reward)));
