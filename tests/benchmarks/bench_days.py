@@ -97,7 +97,10 @@ def fly(given: argparse.Namespace, url: str) -> None:
                         "reward": flown.reward,
                         "satisfaction": flown.satisfaction,
                         "distance": flown.distance,
-                        "decisions": [[d.at, d.seconds, d.changed, d.left_out] for d in flown.decisions],
+                        "decisions": [
+                            [round(d.at, 4), round(d.seconds, 4), d.changed, d.left_out]
+                            for d in flown.decisions
+                        ],
                     }
                 with given.records.open("a", encoding="utf-8") as file:
                     file.write(json.dumps({"kind": kind, "seed": seed, "arm": name, **result}) + "\n")

@@ -23,7 +23,7 @@ from app.simulation.evaluation import reward_of
 from app.solvers.protocol import Solver
 from app.solvers.stop import Deadline
 
-FUTURES = 6
+FUTURES = 4
 """How many futures are drawn for a decision."""
 
 _SHARE_OF_SEARCHES = 0.6
