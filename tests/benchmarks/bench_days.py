@@ -33,7 +33,10 @@ from app.simulation.evaluation import reward_of  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
 
-HINDSIGHT, HINDSIGHT_S = "hindsight", 1.0
+HINDSIGHT = "hindsight"
+HINDSIGHT_S = {kind: 4.0 if of.bases else 1.0 for kind, of in KINDS.items()}
+"""Processor seconds of its search; with reloads one is not enough."""
+
 PLAIN = "auto 0.25 s"
 """The arm that the prices on change begin from."""
 
@@ -90,7 +93,7 @@ def fly(given: argparse.Namespace, url: str) -> None:
                     continue
                 if name == HINDSIGHT:
                     whole = in_hindsight(day)
-                    result = {"reward": reward_of(whole, solved(auto, whole, HINDSIGHT_S, seed))}
+                    result = {"reward": reward_of(whole, solved(auto, whole, HINDSIGHT_S[kind], seed))}
                 else:
                     flown = fly_day(day, arms[name], seed)
                     result = {

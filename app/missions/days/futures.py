@@ -1,5 +1,7 @@
 """Replanning over sampled futures: what may still turn out is drawn several times, and each time planned for.
 
+What is drawn are areas that appear and legs that take longer. Losses are not, nor are wrong reports.
+
 Each of the plans, and the one for what is known alone, is then tried in all of the futures: stops that
 cannot be made there are dropped, and what is left is put in greedily. The plan with the best mean is taken.
 A UAV that it sends first to an area that is only drawn stays, or flies home, until the next look.
@@ -16,7 +18,7 @@ import numpy as np
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem, Target
 from app.missions.days.insertion import insert
-from app.missions.days.kinds import APPEARING_UNTIL, FAILING, KINDS, N_AREAS, Kind, area
+from app.missions.days.kinds import APPEARING_UNTIL, KINDS, N_AREAS, Kind, area
 from app.missions.flying import settle
 from app.missions.state import MissionState, Routes, Stop, routes_of, with_routes, without_plan
 from app.simulation.evaluation import reward_of
@@ -50,7 +52,7 @@ def over_futures(solver: Solver, seconds: float, kind_name: str) -> Any:
     kind = KINDS[kind_name]
 
     def decide(state: MissionState, _number: int, rng: np.random.Generator) -> Routes | None:
-        known = state.problem
+        known = without_plan(state.problem)
         futures = [
             future for future in (_future(state, kind, rng) for _ in range(FUTURES)) if future != known
         ]
@@ -87,11 +89,6 @@ def _uavs(state: MissionState, kind: Kind, rng: np.random.Generator) -> tuple[UA
     if kind.slowest > 1.0:
         slower = rng.uniform(1.0, kind.slowest, (len(uavs), _LEGS)).mean(axis=1)
         uavs = [replace(uav, speed=uav.speed / by) for uav, by in zip(uavs, slower.tolist(), strict=True)]
-    first, last = max(state.clock, FAILING[0]), FAILING[1]
-    flying = [i for i, uav in enumerate(uavs) if uav.id not in state.lost]
-    failing = min(kind.failing - len(state.lost), len(flying)) if first < last else 0
-    for i in rng.choice(flying, failing, replace=False).tolist() if failing > 0 else ():
-        uavs[i] = replace(uavs[i], available_until=float(rng.uniform(first, last)))
     return tuple(uavs)
 
 
