@@ -138,6 +138,13 @@ class Settings(BaseSettings):
         allow_inf_nan=False,
         description="Days until an ended job is deleted, with what it left; `null`: never",
     )
+    mission_retention_days: float | None = Field(
+        default=None,
+        ge=0,
+        allow_inf_nan=False,
+        description="Days without an event until a mission is deleted, with all that is kept of it; `null`: "
+        "never",
+    )
 
     receive_timeout_s: float = Field(
         default=20.0,
@@ -206,6 +213,12 @@ class Settings(BaseSettings):
     def jobs_grace_s(self) -> float:
         """Seconds that running jobs get at a shutdown."""
         return max(0.0, self.shutdown_grace_s - _PUTTING_BACK_S)
+
+    @property
+    def mission_retention_s(self) -> float | None:
+        """Seconds without an event until a mission is deleted; None: never."""
+        days = self.mission_retention_days
+        return None if days is None else days * _SECONDS_A_DAY
 
     @property
     def job_retention_s(self) -> float | None:

@@ -179,7 +179,7 @@ def _missions(
     search = {"library_url": database.url, "threads": settings.threads_per_job}
     sizes = ("uavs", "targets", "no_fly_zones", "zone_corners")
     largest = {name: getattr(settings, f"max_{name}") for name in sizes}
-    return MissionService(store, jobs, judge, search, largest)
+    return MissionService(store, jobs, judge, search, largest, settings.mission_retention_s)
 
 
 def _workers(settings: Settings, database: Database) -> Executor:

@@ -149,7 +149,8 @@ def _straight(problem: Problem) -> Problem:
         return problem
     uavs = tuple(replace(u, location=None, home_location=None, profile=None) for u in problem.uavs)
     targets = tuple(replace(t, location=None) for t in problem.targets)
-    return replace(problem, uavs=uavs, targets=targets, matrices=None)
+    bases = tuple(replace(base, location=None) for base in problem.bases)
+    return replace(problem, uavs=uavs, targets=targets, bases=bases, matrices=None)
 
 
 def _usable_range(uav: UAV) -> float:

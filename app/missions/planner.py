@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from sqlalchemy.exc import InterfaceError, OperationalError
 
-from app.jobs.errors import Draining, QueueFull, failure
+from app.jobs.errors import Draining, JobNotFound, QueueFull, failure
 from app.jobs.model import Idempotency, Job, JobStatus
 from app.jobs.service import JobService
 from app.missions.errors import MissionBusy, MissionNotFound
@@ -53,19 +54,56 @@ class Planner:
         self._changed, self._accept = changed, accept
         self._following: dict[str, asyncio.Task[None]] = {}
         self._again: set[str] = set()
+        # The search of each mission, and the newest event after which another plan may be better.
+        self._searches: dict[str, tuple[str, int]] = {}
+        self._wanted: dict[str, float] = {}
+        self._cancels: set[asyncio.Task[None]] = set()
         self._stopped = False
 
-    def follow(self, mission_id: str) -> None:
-        """Look for a plan of a mission, if it wants one; if that is being done, once more after that."""
+    def follow(self, mission_id: str, wanted: float = 0) -> None:
+        """Look for a plan of a mission, if it wants one; if that is being done, once more after that.
+
+        Parameters
+        ----------
+        mission_id
+            The mission.
+        wanted
+            Number of an event after which another plan may be better: a search for one of before is stopped,
+            as its plan would not be proposed.
+        """
         if mission_id in self._following:
             self._again.add(mission_id)
+            self._wanted[mission_id] = max(wanted, self._wanted.get(mission_id, 0))
+            self._stop_outdated(mission_id)
         elif not self._stopped:
             self._following[mission_id] = asyncio.create_task(self._follow(mission_id))
+
+    def drop(self, mission_id: str) -> None:
+        """Stop looking for plans of a mission that is no more."""
+        if mission_id in self._following:
+            self._wanted[mission_id] = math.inf
+            self._stop_outdated(mission_id)
+
+    def _stop_outdated(self, mission_id: str) -> None:
+        job_id, number = self._searches.get(mission_id, ("", math.inf))
+        if number < self._wanted.get(mission_id, 0):
+            cancel = asyncio.create_task(self._cancel(job_id))
+            self._cancels.add(cancel)
+            cancel.add_done_callback(self._cancels.discard)
+
+    async def _cancel(self, job_id: str) -> None:
+        try:
+            await self._jobs.cancel(job_id)
+        except (Draining, JobNotFound):
+            return
+        except Exception:
+            # It ends at its time limit.
+            _log.exception("an outdated search could not be stopped", extra={"job_id": job_id})
 
     async def stop(self) -> None:
         """Look for nothing any more; what is wanted is known to the tables."""
         self._stopped = True
-        tasks = list(self._following.values())
+        tasks = [*self._following.values(), *self._cancels]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -92,6 +130,7 @@ class Planner:
             _log.exception("the search for a mission's plans has ended", extra={"mission_id": mission_id})
         finally:
             del self._following[mission_id]
+            self._wanted.pop(mission_id, None)
             if mission_id in self._again:
                 self._again.discard(mission_id)
                 self.follow(mission_id)
@@ -108,12 +147,19 @@ class Planner:
             return not head.mission.wants_plan
         once = Idempotency("missions", f"{mission_id}/{mission.state_number}", "")
         job, _ = await self._jobs.submit(REPLAN, self._payload(head), idempotency=once)
-        job = await self._jobs.wait(job.id, None)
+        number = mission.state_number
+        self._searches[mission_id] = job.id, number
+        try:
+            self._stop_outdated(mission_id)
+            job = await self._jobs.wait(job.id, None)
+        finally:
+            del self._searches[mission_id]
         if not job.status.finished:
             raise Draining
         if job.status is not JobStatus.SUCCEEDED:
-            number = mission.state_number
-            await asyncio.to_thread(self._store.planned_in_vain, mission_id, number, _trouble_of(job))
+            stopped = job.status is JobStatus.CANCELLED and number < self._wanted.get(mission_id, 0)
+            trouble = None if stopped else _trouble_of(job)
+            await asyncio.to_thread(self._store.planned_in_vain, mission_id, number, trouble)
         self._changed(mission_id)
         return False
 

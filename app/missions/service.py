@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+import time
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
@@ -26,6 +28,9 @@ from app.missions.streams import MissionStreams, Told
 _TRIES = 20
 _SETTLE_S = 2.0
 _CHECKS = 100
+_EXPIRE_EVERY_S, _EXPIRED_AT_ONCE = 60.0, 20
+
+_log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 _CLOSES = {"proposal_accepted": ProposalStatus.ACCEPTED, "proposal_refused": ProposalStatus.REFUSED}
@@ -46,6 +51,8 @@ class MissionService:
         What the payload of a search has besides: ``library_url`` and ``threads``.
     largest
         How many ``uavs``, ``targets``, ``no_fly_zones`` and ``zone_corners`` a problem may have.
+    retention_s
+        Seconds without an event until a mission is deleted; None: never.
 
     Attributes
     ----------
@@ -60,6 +67,7 @@ class MissionService:
         judge: Judge,
         search: Mapping[str, Any],
         largest: Mapping[str, int],
+        retention_s: float | None = None,
     ) -> None:
         self.store, self._judge, self._largest = store, judge, largest
         self._streams = MissionStreams(store)
@@ -68,11 +76,15 @@ class MissionService:
         self._checks: dict[str, PositionCheck] = {}
         self._turns: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._begun: set[asyncio.Task[Any]] = set()
+        self._retention_s = retention_s
+        self._expiry: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Go on with the searches that an earlier process was at; the jobs have to be started before."""
         for mission_id in await asyncio.to_thread(self.store.wanting):
             self._planner.follow(mission_id)
+        if self._retention_s is not None:
+            self._expiry = asyncio.create_task(self._expire(self._retention_s))
 
     def begin_stop(self) -> None:
         """End all streams."""
@@ -81,6 +93,8 @@ class MissionService:
     async def stop(self) -> None:
         """End streams, searches and the judge; what was judged in time is written."""
         self.begin_stop()
+        if self._expiry is not None:
+            self._expiry.cancel()
         if self._begun:
             await asyncio.wait(self._begun, timeout=_SETTLE_S)
         await self._planner.stop()
@@ -230,7 +244,7 @@ class MissionService:
             self.store.commit, head.mission.id, head.mission.last_number, sent, judged
         )
         if judged.wants_plan and new:
-            self._planner.follow(head.mission.id)
+            self._planner.follow(head.mission.id, entry.number)
         return entry, new
 
     def _require_sizes(self, head: Head, event: events.Event) -> None:
@@ -282,7 +296,28 @@ class MissionService:
             If there is none of that id.
         """
         await asyncio.to_thread(self.store.delete, mission_id)
+        self._forget(mission_id)
+
+    def _forget(self, mission_id: str) -> None:
+        """Stop what is done for a mission that is no more."""
+        self._checks.pop(mission_id, None)
+        self._planner.drop(mission_id)
         self._streams.wake(mission_id)
+
+    async def _expire(self, retention_s: float) -> None:
+        """Delete missions in which nothing happens any more, some at a time."""
+        while True:
+            gone: list[str] = []
+            try:
+                before = time.time() - retention_s
+                gone = await asyncio.to_thread(self.store.expire, before, _EXPIRED_AT_ONCE)
+            except Exception:
+                _log.exception("old missions could not be deleted; there will be another try")
+            for mission_id in gone:
+                self._forget(mission_id)
+            if gone:
+                _log.info("missions of long ago were deleted", extra={"missions": len(gone)})
+            await asyncio.sleep(0.0 if len(gone) == _EXPIRED_AT_ONCE else _EXPIRE_EVERY_S)
 
     async def look(self, mission_id: str, at: float | None) -> tuple[int, Mapping[str, Any]]:
         """Return the state of a mission at a moment: as it was, or as it is planned to be.

@@ -139,6 +139,28 @@ class MissionStore(MissionQueries):
             find(connection, mission_id)
             connection.execute(sa.delete(missions).where(missions.c.id == mission_id))
 
+    def expire(self, before: float, limit: int) -> list[str]:
+        """Delete missions in which nothing has happened for long.
+
+        Parameters
+        ----------
+        before
+            Seconds since 1970: only missions whose newest event was written before then.
+        limit
+            How many at most: other writers wait that long.
+
+        Returns
+        -------
+        list of str
+            Their ids.
+        """
+        newest = sa.and_(events.c.mission_id == missions.c.id, events.c.number == missions.c.last_number)
+        old = sa.select(missions.c.id).join(events, newest).where(events.c.recorded_at < before)
+        with self.database.write() as connection:
+            gone = list(connection.scalars(old.order_by(missions.c.number).limit(limit)))
+            connection.execute(sa.delete(missions).where(missions.c.id.in_(gone)))
+        return gone
+
     def commit(self, mission_id: str, seen: int, sent: Sent, judged: Judged) -> tuple[Entry, bool]:
         """Keep an event and the state that it makes.
 

@@ -7,7 +7,9 @@ import pytest
 from problems import on_earth, random_problem
 from worlds import random_world
 
-from app.domain.problem import Objective
+from app.domain.matrices import Matrix
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.surroundings import Base
 from app.library.summary import FEATURES, task_summary
 from app.simulation.generator import FAMILIES, generate
 
@@ -177,3 +179,21 @@ def test_bounded_and_finite_whatever_the_world():
         assert np.isfinite(summary).all()
         assert (summary >= 0).all()
         assert (summary <= 1 + 1e-12).all()
+
+
+def test_a_task_with_bases_and_matrices_is_summarised():
+    base = Base("base-1", 1.0, 0.0, location=2)
+    uavs = (UAV("uav-1", 0.0, 0.0, 0.0, 0.0, 1.0, 9.0, (2.0,), location=0),)
+    areas = (Target("area-1", 2.0, 0.0, 1.0, (2.0,), location=1),)
+    legs = Matrix([[0.0, 2.0, 1.0], [2.0, 0.0, 1.0], [1.0, 1.0, 0.0]])
+    with_tables = Problem(uavs, areas, bases=(base,), matrices={"all": legs})
+    summary = task_summary(with_tables)
+    assert np.isfinite(summary).all()
+    plain = replace(
+        with_tables,
+        uavs=(replace(uavs[0], location=None, home_location=None),),
+        targets=(replace(areas[0], location=None),),
+        bases=(replace(base, location=None),),
+        matrices=None,
+    )
+    assert summary == pytest.approx(task_summary(plain))

@@ -1,6 +1,7 @@
 """The tables of missions: an event and its state are one, numbers have no gaps, ids are kept once."""
 
 import pytest
+import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
@@ -8,7 +9,7 @@ from app.jobs import stored_json
 from app.missions.errors import EventReused, MissionNotFound
 from app.missions.model import Planning, ProposalStatus
 from app.missions.store import VERSION_TABLE, Judged, MissionStore, Moved, Sent, newest_of
-from app.missions.tables import metadata
+from app.missions.tables import events, metadata
 from policy_store.database import Database
 
 PLANNING = Planning("greedy", {}, 1, 0.5, "proposed")
@@ -142,3 +143,16 @@ def test_a_mission_is_deleted_with_all_that_is_kept_of_it(store, mission):
             assert connection.execute(table.select()).all() == []
     with store.database.write() as connection:
         assert store.propose(connection, mission, 1, "job", content()) is None
+
+
+def test_missions_in_which_nothing_happens_any_more_are_deleted(store, mission):
+    busy = store.create("another", PROBLEM, PLANNING, state(0.0), {}).id
+    with store.database.write() as connection:
+        connection.execute(sa.update(events).values(recorded_at=100.0))
+    store.commit(busy, 1, sent("a"), judged(1.0))
+    assert store.expire(100.0, 10) == []
+    assert store.expire(100.5, 10) == [mission]
+    assert [each.id for each in store.page(10, None)[0]] == [busy]
+    with store.database.read() as connection:
+        assert set(connection.scalars(sa.select(events.c.mission_id))) == {busy}
+    assert store.expire(100.5, 10) == []
