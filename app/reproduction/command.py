@@ -12,11 +12,11 @@ from app.reproduction.errors import ImpossibleScale
 from app.reproduction.figures import require_packages
 from app.reproduction.grid import Run, missing_packages, runs_of
 from app.reproduction.race.outcome import Outcome
-from app.reproduction.race.places import Place
+from app.reproduction.race.places import RACE_PROBLEMS, Place
 from app.reproduction.race.report import write_race
 from app.reproduction.race.runs import RaceRun, race_runs
 from app.reproduction.records import RecordStore
-from app.reproduction.report import describe, write_report, write_sums
+from app.reproduction.report import command_line, describe, write_report, write_sums
 from app.reproduction.runner import Work, do_runs
 from app.reproduction.scale import QUICK, Cell, Scale
 
@@ -136,6 +136,7 @@ def reproduce(
         write_report(scale, paper, out)
     if race:
         outcome = Outcome(race, RecordStore(out))
-        write_race(outcome, out, describe(scale, outcome.sources))
+        command = f"{command_line(scale)} --parts '{' '.join(parts)}'"
+        write_race(outcome, out, describe(command, RACE_PROBLEMS, outcome.sources))
     write_sums(out)
     return True

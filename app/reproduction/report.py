@@ -18,6 +18,8 @@ from app.reproduction.tables import tables
 SUMS = "SHA256SUMS"
 """Name of the file of checksums."""
 
+_PROBLEMS = f"problems of the family {FAMILY}, seeds [{PROBLEM_SEED}, M, N, number] with numbers from 0"
+
 _OPTIONS = (
     "problems",
     "seeds",
@@ -47,7 +49,7 @@ def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
         Folder of the records, and for the report.
     """
     results = Results(runs, RecordStore(out))
-    provenance = describe(scale, results.sources)
+    provenance = describe(command_line(scale), _PROBLEMS, results.sources)
     for table in (*tables(results), claims_table(results)):
         table.write(out / ("timed" if table.timed else "") / "tables", provenance)
     write_figures(results, out / "figures", out / "timed" / "figures", provenance)
@@ -67,16 +69,12 @@ def sums_of(folder: Path) -> str:
     return "".join(lines)
 
 
-def describe(scale: Scale, sources: Iterable[tuple[str, str, str]]) -> str:
-    """Say in one line where figures come from: command, commit, seeds, machine and versions."""
+def describe(command: str, problems: str, sources: Iterable[tuple[str, str, str]]) -> str:
+    """Say in one line where figures come from: command, problems, seeds, commit, machine and versions."""
     where = "; ".join(
         f"commit {commit}, {machine}, {versions}" for commit, machine, versions in sorted(sources)
     )
-    return (
-        f"Made by `{command_line(scale)}`: problems of the family {FAMILY}, "
-        f"seeds [{PROBLEM_SEED}, M, N, number] with numbers from 0; "
-        f"solvers' seeds from {FIRST_SEED}; {where}."
-    )
+    return f"Made by `{command}`: {problems}; solvers' seeds from {FIRST_SEED}; {where}."
 
 
 def command_line(scale: Scale) -> str:

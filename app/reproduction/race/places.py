@@ -61,3 +61,8 @@ class Place(NamedTuple):
 
 PLACES = (*(Place(family, cell) for family in RACE_FAMILIES for cell in GRID), Place(DRAWN, None))
 """All places; their names are :data:`~app.reproduction.scale.RACE_PLACES`."""
+
+RACE_PROBLEMS = (
+    f"problems of the places named, drawn from seeds that begin with {PROBLEM_SEED}, numbers from 0"
+)
+"""The problems, in words."""
