@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import fmean
@@ -81,17 +82,20 @@ def write_figures(results: Results, values: Path, timed: Path, provenance: str) 
     provenance
         Where they come from; it is in the files' metadata.
     """
+    with styled():
+        save_figures(_figures(results), values, timed, provenance)
+
+
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which figures have the style of this room."""
     import matplotlib as mpl  # noqa: PLC0415 - an extra
 
-    with mpl.rc_context(STYLE):
-        save_figures(_figures(results), values, timed, provenance)
+    return mpl.rc_context(STYLE)
 
 
 def save_figures(figures: Iterable[Drawn], values: Path, timed: Path, provenance: str) -> None:
     """Write figures as SVG and PNG; see :func:`write_figures`."""
-    import matplotlib as mpl  # noqa: PLC0415 - an extra
-
-    with mpl.rc_context(STYLE):
+    with styled():
         for drawn in figures:
             folder = timed if drawn.timed else values
             folder.mkdir(parents=True, exist_ok=True)

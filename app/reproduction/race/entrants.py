@@ -38,8 +38,8 @@ class Entrant:
         Which race.
     parameters
         By scale.
-    per_epoch
-        Evaluations in an epoch of its history.
+    first, per_epoch
+        Evaluations before the first epoch of its history, and in each.
     learns
         Whether it learns a network, so that it is run on few problems and seeds.
     """
@@ -49,8 +49,13 @@ class Entrant:
     algorithm: str
     budget: Budget
     parameters: Callable[[Scale], dict[str, Any]]
+    first: int = 0
     per_epoch: int = 1
     learns: bool = False
+
+    def evaluations(self, epoch: int) -> int:
+        """Return how many plans were flown until an epoch of its history was over."""
+        return self.first + epoch * self.per_epoch
 
 
 _POPULATION = 30
@@ -83,6 +88,7 @@ def _entrants() -> list[Entrant]:
             equal,
             lambda scale: {"iteration": max(0, scale.race_evaluations // _POPULATION - 1)},
             _POPULATION,
+            _POPULATION,
         ),
         Entrant("qmix-paper", "QMIX from scratch (Algorithm 1)", "qmix", equal, _qmix, learns=True),
         Entrant(
@@ -103,6 +109,7 @@ def _entrants() -> list[Entrant]:
             "ga",
             timed,
             lambda _scale: {"iteration": _ENDLESS},
+            _POPULATION,
             _POPULATION,
         ),
         Entrant(

@@ -79,7 +79,7 @@ class Outcome:
         finish = Finish(
             run,
             record.get("reward"),
-            tuple(epoch * run.how.per_epoch for epoch in history["epoch"]),
+            tuple(map(run.how.evaluations, history["epoch"])),
             tuple(history["reward"]),
         )
         self._finishes.setdefault((run.method, run.place), []).append(finish)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.reproduction.figures import Drawn, figure_of, put_legend, save_figures
+from app.reproduction.figures import Drawn, figure_of, put_legend, save_figures, styled
 from app.reproduction.race.entrants import COMPARED, ENTRANTS, Budget
 from app.reproduction.race.outcome import Outcome
 from app.reproduction.race.places import Place
@@ -42,6 +42,11 @@ def write_race(outcome: Outcome, out: Path, provenance: str) -> None:
     for budget in (Budget.EVALUATIONS, Budget.SECONDS):
         for table in (_overall(outcome, budget), _by_place(outcome, budget)):
             table.write(out / ("timed" if table.timed else "") / "tables", provenance)
+    with styled():
+        save_figures(_figures(outcome), out / "figures", out / "timed" / "figures", provenance)
+
+
+def _figures(outcome: Outcome) -> list[Drawn]:
     drawn = [
         Drawn("race_evaluations", _profiles(outcome, Budget.EVALUATIONS)),
         Drawn("race_seconds", _profiles(outcome, Budget.SECONDS), timed=True),
@@ -50,7 +55,7 @@ def write_race(outcome: Outcome, out: Path, provenance: str) -> None:
         place = Place(RACE_FAMILIES[0], cell)
         if place in outcome.places:
             drawn.append(Drawn(f"race_curves_{cell}", _curves(outcome, place)))
-    save_figures(drawn, out / "figures", out / "timed" / "figures", provenance)
+    return drawn
 
 
 def _overall(outcome: Outcome, budget: Budget) -> Table:
@@ -136,7 +141,7 @@ def _profiles(outcome: Outcome, budget: Budget) -> Any:
     for name, colour in zip(_shown(outcome, budget), _COLOURS, strict=False):
         strata = outcome.strata(name)
         found = np.array([estimate(strata, share_above(float(t))) for t in _THRESHOLDS])
-        axes.fill_between(_THRESHOLDS, found[:, 1], found[:, 2], color=colour, alpha=0.12, linewidth=0)
+        axes.fill_between(_THRESHOLDS, found[:, 1], found[:, 2], color=colour, alpha=0.08, linewidth=0)
         axes.plot(_THRESHOLDS, found[:, 0], color=colour, label=ENTRANTS[name].label)
     axes.set(xlabel="share of the best known reward", ylabel="part of the runs that reach it", ylim=(0, 1.02))
     axes.set_title(f"equal {budget}")
