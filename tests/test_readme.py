@@ -26,6 +26,7 @@ PAGES = (
     "README.md",
     "app/domain/README.md",
     "app/solvers/README.md",
+    "app/solvers/markets/README.md",
     "app/api/README.md",
     "app/api/plan_formats/README.md",
     "app/library/README.md",

@@ -75,6 +75,18 @@ _PARAMETERS: dict[str, dict[str, Any]] = {
         "learning_starts": 1,
     },
     "auto": {"moves": 200, "policy": False},
+    **{
+        name: {"evaluations": 50}
+        for name in (
+            "particle_swarm",
+            "grey_wolf",
+            "beetle_antennae",
+            "ant_colony",
+            "contract_net",
+            "bundles",
+            "semi_random_q",
+        )
+    },
 }
 
 

@@ -40,6 +40,16 @@ def reproduce(
     cells: Annotated[
         str | None, typer.Option(help="Sizes, UAVs x areas, such as '5x10 10x5'; default: the whole grid.")
     ] = None,
+    race_problems: Annotated[int | None, typer.Option(min=1, help="Problems a place of the race.")] = None,
+    race_seeds: Annotated[int | None, typer.Option(min=1, help="Seeds a problem of the race.")] = None,
+    race_evaluations: Annotated[
+        int | None, typer.Option(min=1, help="Plans that each may fly in the race of equal evaluations.")
+    ] = None,
+    race_places: Annotated[
+        str | None,
+        typer.Option(help="Places of the race, such as 'clustered-5x10 drawn'; default: all."),
+    ] = None,
+    parts: Annotated[str, typer.Option(help="'paper', 'race' or both.")] = "paper race",
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = os.cpu_count() or 1,
     for_minutes: Annotated[
         float | None,
@@ -63,13 +73,16 @@ def reproduce(
         "learning_problems": learning_problems,
         "learning_seeds": learning_seeds,
         "timed_problems": timed_problems,
+        "race_problems": race_problems,
+        "race_seeds": race_seeds,
+        "race_evaluations": race_evaluations,
     }
     with refusals():
-        scale = command.scale_of(quick, {k: v for k, v in given.items() if v is not None}, cells)
+        scale = command.scale_of(quick, {k: v for k, v in given.items() if v is not None}, cells, race_places)
         for package in command.missing_packages():
             typer.echo(f"{package} is not installed, so it is not compared with (extra: compare)", err=True)
-        with bar("runs", total=float(command.count_runs(scale))) as advance:
-            complete = command.reproduce(scale, out, workers, for_minutes, advance)
+        with bar("runs", total=float(command.count_runs(scale, parts.split()))) as advance:
+            complete = command.reproduce(scale, out, workers, for_minutes, advance, parts.split())
     if not complete:
         typer.echo("not all runs are done: the same command goes on", err=True)
         raise typer.Exit(3)

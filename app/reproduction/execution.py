@@ -31,7 +31,8 @@ from policy_store.library import PolicyLibrary
 NEIGHBOUR_MOVED = 0.05
 """Standard deviation by which a neighbouring task's positions differ, in the side of the unit square."""
 
-_GENERAL = {"pyvrp": pyvrp_plan, "ortools": routing_plan}
+GENERAL = {"pyvrp": pyvrp_plan, "ortools": routing_plan}
+"""The general optimisers, by their names."""
 
 
 class Outcome(NamedTuple):
@@ -164,8 +165,8 @@ def _solve(
 def _timed(run: Run, problem: Problem, library_url: str) -> Outcome:
     seconds, name = float(run.parameters["seconds"]), run.how.algorithm
     begun = time.perf_counter()
-    if name in _GENERAL:
-        plan = _GENERAL[name](problem, seconds, run.seed)
+    if name in GENERAL:
+        plan = GENERAL[name](problem, seconds, run.seed)
     else:
         solver = create_solver(name, parse_parameters(name, {}), SolverContext(library_url))
         plan = solver.solve(problem, run.seed, Deadline(seconds), lambda _progress: None).plan

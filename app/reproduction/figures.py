@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from importlib.util import find_spec
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -55,18 +57,17 @@ class Drawn(NamedTuple):
     timed: bool = False
 
 
-def require_matplotlib() -> None:
-    """Refuse to go on without matplotlib, before hours of runs and not after.
+def require_packages() -> None:
+    """Refuse to go on without matplotlib and scipy, before hours of runs and not after.
 
     Raises
     ------
     MissingPackage
-        If it is not installed.
+        If one is not installed.
     """
-    try:
-        import matplotlib  # noqa: F401, PLC0415 - an extra
-    except ImportError:
-        raise MissingPackage('matplotlib is not installed: .venv/bin/pip install -e ".[reproduce]"') from None
+    for name in ("matplotlib", "scipy"):
+        if find_spec(name) is None:
+            raise MissingPackage(f'{name} is not installed: .venv/bin/pip install -e ".[reproduce]"')
 
 
 def write_figures(results: Results, values: Path, timed: Path, provenance: str) -> None:
@@ -81,10 +82,21 @@ def write_figures(results: Results, values: Path, timed: Path, provenance: str) 
     provenance
         Where they come from; it is in the files' metadata.
     """
+    with styled():
+        save_figures(_figures(results), values, timed, provenance)
+
+
+def styled() -> AbstractContextManager[None]:
+    """Return a context in which figures have the style of this room."""
     import matplotlib as mpl  # noqa: PLC0415 - an extra
 
-    with mpl.rc_context(STYLE):
-        for drawn in _figures(results):
+    return mpl.rc_context(STYLE)
+
+
+def save_figures(figures: Iterable[Drawn], values: Path, timed: Path, provenance: str) -> None:
+    """Write figures as SVG and PNG; see :func:`write_figures`."""
+    with styled():
+        for drawn in figures:
             folder = timed if drawn.timed else values
             folder.mkdir(parents=True, exist_ok=True)
             drawn.figure.savefig(
@@ -124,7 +136,8 @@ def _figures(results: Results) -> list[Drawn]:
     return [Drawn("action_space", _action_space()), *found]
 
 
-def _figure(rows: int, columns: int, width: float, height: float, **kwargs: Any) -> tuple[Any, Any]:
+def figure_of(rows: int, columns: int, width: float, height: float, **kwargs: Any) -> tuple[Any, Any]:
+    """Return a figure and its axes."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra
 
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -133,7 +146,7 @@ def _figure(rows: int, columns: int, width: float, height: float, **kwargs: Any)
 
 def _curves(results: Results, cell: Cell, methods: Sequence[str], levels: Sequence[str]) -> Any:
     """Reward of one problem as in the paper, and beside it the share of the best known of all problems."""
-    figure, (one, every) = _figure(1, 2, 9.5, 4.0)
+    figure, (one, every) = figure_of(1, 2, 9.5, 4.0)
     number = results.problems(cell)[0]
     best, bound = results.best_known(cell, number), results.bound(cell, number)
     for name in methods:
@@ -157,11 +170,11 @@ def _curves(results: Results, cell: Cell, methods: Sequence[str], levels: Sequen
     every.axhline(1.0, color="black", linewidth=0.8, label="best known")
     one.set(title=f"{cell}, problem {number}", xlabel="epoch or generation", ylabel="cumulative reward")
     every.set(title=f"{cell}, all problems", xlabel="epoch or generation", ylabel="share of the best known")
-    _legend(figure, (every, one))
+    put_legend(figure, (every, one))
     return figure
 
 
-def _legend(figure: Any, parts: Sequence[Any]) -> None:
+def put_legend(figure: Any, parts: Sequence[Any]) -> None:
     """Put one legend below the axes, every label once."""
     labelled: dict[str, Any] = {}
     for axes in parts:
@@ -180,7 +193,7 @@ def _one_problem(axes: Any, results: Results, cell: Cell, name: str, number: int
 
 def _grid(results: Results, cells: Sequence[Cell]) -> Any:
     """A group of bars a size: mean share of the best known, with the spread of the problems."""
-    figure, axes = _figure(1, 1, 10, 4.0)
+    figure, axes = figure_of(1, 1, 10, 4.0)
     methods = [m for m in _GRID_METHODS if any(results.entries(cell, m) for cell in cells)]
     width = 0.85 / len(methods)
     for offset, name in enumerate(methods):
@@ -200,13 +213,13 @@ def _grid(results: Results, cells: Sequence[Cell]) -> Any:
     axes.axhline(1.0, color="black", linewidth=0.8)
     axes.set_xticks(range(len(cells)), [str(cell) for cell in cells])
     axes.set(xlabel="UAVs x areas", ylabel="share of the best known", ylim=(0, 1.1))
-    _legend(figure, [axes])
+    put_legend(figure, [axes])
     return figure
 
 
 def _dqn(results: Results) -> Any:
     """DQN and QMIX with the same epochs, by number of UAVs; the share of the best known."""
-    figure, axes = _figure(1, 1, 7, 3.4)
+    figure, axes = figure_of(1, 1, 7, 3.4)
     cells = [cell for cell in (*SMALL, *GRID) if results.entries(cell, "dqn")]
     for name in ("dqn", "qmix-paper", "ga"):
         shown = [
@@ -224,13 +237,13 @@ def _dqn(results: Results) -> Any:
     ticks = [f"{cell}\n{(cell.n + 1) ** cell.m:,} joint actions" for cell in cells]
     axes.set_xticks(range(len(cells)), ticks, fontsize=7)
     axes.set(ylabel="share of the best known")
-    _legend(figure, [axes])
+    put_legend(figure, [axes])
     return figure
 
 
 def _action_space() -> Any:
     """Joint actions by number of UAVs, and what QMIX compares instead."""
-    figure, axes = _figure(1, 1, 5, 3.4)
+    figure, axes = figure_of(1, 1, 5, 3.4)
     swarm = range(1, 21)
     for n, shade in ((5, 0.35), (10, 0.55), (20, 0.75), (30, 1.0)):
         axes.semilogy(
@@ -246,7 +259,7 @@ def _action_space() -> Any:
 
 def _times(results: Results, cells: Sequence[Cell]) -> Any:
     """Seconds by size, a line a method."""
-    figure, axes = _figure(1, 1, 8, 4.4)
+    figure, axes = figure_of(1, 1, 8, 4.4)
     for name, colour in COLOURS.items():
         shown = [(c, results.entries(cell, name)) for c, cell in enumerate(cells)]
         shown = [(c, entries) for c, entries in shown if entries]
@@ -255,13 +268,13 @@ def _times(results: Results, cells: Sequence[Cell]) -> Any:
             axes.semilogy([c for c, _ in shown], seconds, color=colour, marker="o", label=METHODS[name].label)
     axes.set_xticks(range(len(cells)), [str(cell) for cell in cells])
     axes.set(xlabel="UAVs x areas", ylabel="seconds")
-    _legend(figure, [axes])
+    put_legend(figure, [axes])
     return figure
 
 
 def _optimisers(results: Results, cells: Sequence[Cell]) -> Any:
     """Mean share of the best known by size, a line an optimiser, all within the same time."""
-    figure, axes = _figure(1, 1, 7.5, 3.4)
+    figure, axes = figure_of(1, 1, 7.5, 3.4)
     names = [name for name, method in METHODS.items() if method.kind is Kind.TIMED]
     for name, marker in zip(names, "os^v", strict=True):
         shown = [
@@ -273,5 +286,5 @@ def _optimisers(results: Results, cells: Sequence[Cell]) -> Any:
     axes.axhline(1.0, color="black", linewidth=0.8)
     axes.set_xticks(range(len(cells)), [str(cell) for cell in cells])
     axes.set(xlabel="UAVs x areas", ylabel="share of the best known")
-    _legend(figure, [axes])
+    put_legend(figure, [axes])
     return figure

@@ -11,6 +11,7 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.reproduction.methods import GENERAL_OPTIMISERS, METHODS, Breadth, Kind, Method
+from app.reproduction.records import TIMED, UNTIMED
 from app.reproduction.scale import Cell, Scale
 from app.simulation.generator import generate
 from app.solvers.registry import parse_parameters
@@ -59,6 +60,11 @@ class Run:
     def how(self) -> Method:
         """The method."""
         return METHODS[self.method]
+
+    @property
+    def folder(self) -> str:
+        """Where its record is."""
+        return TIMED if self.how.kind is Kind.TIMED else UNTIMED
 
     def as_record(self) -> dict[str, Any]:
         """Return what tells it from other runs, as JSON has it."""

@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-_PACKAGES = ("numpy", "numba", "torch", "highspy", "matplotlib", "pyvrp", "ortools")
+_PACKAGES = ("numpy", "numba", "torch", "highspy", "matplotlib", "scipy", "pyvrp", "ortools")
 
 
 @cache

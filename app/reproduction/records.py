@@ -9,12 +9,30 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
-
-from app.reproduction.grid import Run
-from app.reproduction.methods import Kind
+from typing import Any, Protocol
 
 Record = dict[str, Any]
+
+UNTIMED, TIMED = "runs", "timed"
+"""Folders of records: of what only depends on seeds, and of what a time limit ends."""
+
+
+class Recorded(Protocol):
+    """A run that a record can be of."""
+
+    @property
+    def id(self) -> str:
+        """A path without suffix."""
+        ...
+
+    @property
+    def folder(self) -> str:
+        """Where its record is: ``UNTIMED`` or ``TIMED``."""
+        ...
+
+    def as_record(self) -> Record:
+        """Return what tells it from other runs, as JSON has it."""
+        ...
 
 
 class RecordStore:
@@ -29,30 +47,29 @@ class RecordStore:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def finished(self, run: Run) -> bool:
+    def finished(self, run: Recorded) -> bool:
         """Whether a run's record is there, with the same parameters."""
         return self.read(run) is not None
 
-    def read(self, run: Run) -> Record | None:
+    def read(self, run: Recorded) -> Record | None:
         """Return a run's record, or None where there is none or it is of other parameters or damaged."""
         record = _read(self._record(run))
         wanted = json.loads(json.dumps(run.as_record()))
         return record if record is not None and record.get("run") == wanted else None
 
-    def timing(self, run: Run) -> Record | None:
+    def timing(self, run: Recorded) -> Record | None:
         """Return what a run took: ``seconds``, ``commit``, ``machine``, ``versions``; None where unknown."""
         return _read(self._timing(run))
 
-    def write(self, run: Run, record: Record, timing: Record) -> None:
+    def write(self, run: Recorded, record: Record, timing: Record) -> None:
         """Write a finished run: complete or not at all."""
         _write(self._timing(run), timing)
         _write(self._record(run), {"run": run.as_record(), **record})
 
-    def _record(self, run: Run) -> Path:
-        folder = "timed" if run.how.kind is Kind.TIMED else "runs"
-        return self._folder / folder / f"{run.id}.json"
+    def _record(self, run: Recorded) -> Path:
+        return self._folder / run.folder / f"{run.id}.json"
 
-    def _timing(self, run: Run) -> Path:
+    def _timing(self, run: Recorded) -> Path:
         return self._folder / "timings" / f"{run.id}.json"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from app.reproduction.tables import tables
 SUMS = "SHA256SUMS"
 """Name of the file of checksums."""
 
+_PROBLEMS = f"problems of the family {FAMILY}, seeds [{PROBLEM_SEED}, M, N, number] with numbers from 0"
+
 _OPTIONS = (
     "problems",
     "seeds",
@@ -27,13 +29,17 @@ _OPTIONS = (
     "grid_epochs",
     "service_epochs",
     "timed_problems",
+    "race_problems",
+    "race_seeds",
+    "race_evaluations",
 )
 
 
 def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
     """Write ``tables/`` and ``figures/``, and ``timed/`` for what differs from run to run.
 
-    ``SHA256SUMS`` is of all tables and figures that do not: a second run is compared by it.
+    :func:`write_sums` follows: ``SHA256SUMS`` is of all tables and figures that do not, and a second run is
+    compared by it.
 
     Parameters
     ----------
@@ -43,10 +49,14 @@ def write_report(scale: Scale, runs: Sequence[Run], out: Path) -> None:
         Folder of the records, and for the report.
     """
     results = Results(runs, RecordStore(out))
-    provenance = describe(scale, results)
+    provenance = describe(command_line(scale), _PROBLEMS, results.sources)
     for table in (*tables(results), claims_table(results)):
         table.write(out / ("timed" if table.timed else "") / "tables", provenance)
     write_figures(results, out / "figures", out / "timed" / "figures", provenance)
+
+
+def write_sums(out: Path) -> None:
+    """Write ``SHA256SUMS``."""
     (out / SUMS).write_text(sums_of(out), encoding="utf-8")
 
 
@@ -59,16 +69,12 @@ def sums_of(folder: Path) -> str:
     return "".join(lines)
 
 
-def describe(scale: Scale, results: Results) -> str:
-    """Say in one line where figures come from: command, commit, seeds, machine and versions."""
+def describe(command: str, problems: str, sources: Iterable[tuple[str, str, str]]) -> str:
+    """Say in one line where figures come from: command, problems, seeds, commit, machine and versions."""
     where = "; ".join(
-        f"commit {commit}, {machine}, {versions}" for commit, machine, versions in sorted(results.sources)
+        f"commit {commit}, {machine}, {versions}" for commit, machine, versions in sorted(sources)
     )
-    return (
-        f"Made by `{command_line(scale)}`: problems of the family {FAMILY}, "
-        f"seeds [{PROBLEM_SEED}, M, N, number] with numbers from 0; "
-        f"solvers' seeds from {FIRST_SEED}; {where}."
-    )
+    return f"Made by `{command}`: {problems}; solvers' seeds from {FIRST_SEED}; {where}."
 
 
 def command_line(scale: Scale) -> str:
@@ -82,7 +88,9 @@ def command_line(scale: Scale) -> str:
             words.append(f"--{name.replace('_', '-')} {getattr(scale, name)}")
     if scale.cells != start.cells:
         words.append(f"--cells '{' '.join(map(str, scale.cells))}'")
-    known = {*_OPTIONS, "cells"}
+    if scale.race_places != start.race_places:
+        words.append(f"--race-places '{' '.join(scale.race_places)}'")
+    known = {*_OPTIONS, "cells", "race_places"}
     words += [
         f"[{each.name} {getattr(scale, each.name)}]"
         for each in fields(Scale)

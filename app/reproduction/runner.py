@@ -12,9 +12,13 @@ from pathlib import Path
 from app.library.seeding import seed_library
 from app.reproduction.grid import Run
 from app.reproduction.provenance import commit, machine, versions
+from app.reproduction.race.runs import RaceRun
 from app.reproduction.records import RecordStore
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
+
+Work = Run | RaceRun
+"""What is done by a worker."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +35,11 @@ class Done:
 
     finished: int
     total: int
-    last: Run | None = None
+    last: Work | None = None
 
 
 def do_runs(
-    runs: Sequence[Run], folder: Path, workers: int, begin_until: float | None = None
+    runs: Sequence[Work], folder: Path, workers: int, begin_until: float | None = None
 ) -> Iterator[Done]:
     """Do the runs whose records are not in a folder yet.
 
@@ -66,9 +70,8 @@ def do_runs(
         return
     # Spawned, not forked: a child forked after torch has run in the parent hangs.
     context = multiprocessing.get_context("spawn")
-    methods = {run.method for run in left}
-    pool = ProcessPoolExecutor(workers, context, _initialise, (str(folder), _library(folder), methods))
-    waiting, pending = list(reversed(left)), set[Future[Run]]()
+    pool = ProcessPoolExecutor(workers, context, _initialise, (str(folder), _library(folder), left))
+    waiting, pending = list(reversed(left)), set[Future[Work]]()
     try:
         while waiting or pending:
             late = begin_until is not None and time.monotonic() >= begin_until
@@ -101,20 +104,24 @@ _shared: dict[str, str] = {}
 """What a worker process was told at its start."""
 
 
-def _initialise(folder: str, library_url: str, methods: set[str]) -> None:
+def _initialise(folder: str, library_url: str, runs: Sequence[Work]) -> None:
     import torch  # noqa: PLC0415 - only workers need it
 
     from app.reproduction.execution import warm_up  # noqa: PLC0415 - loads torch
+    from app.reproduction.race.execution import warm_up as warm_up_race  # noqa: PLC0415 - loads torch
 
     torch.set_num_threads(1)
     _shared.update(folder=folder, library_url=library_url)
-    warm_up(library_url, methods)
+    warm_up(library_url, {run.method for run in runs if isinstance(run, Run)})
+    warm_up_race([run for run in runs if isinstance(run, RaceRun)], library_url)
 
 
-def _do(run: Run) -> Run:
+def _do(run: Work) -> Work:
     from app.reproduction.execution import execute  # noqa: PLC0415 - loads torch
+    from app.reproduction.race.execution import execute as execute_race  # noqa: PLC0415 - loads torch
 
-    record, seconds = execute(run, _shared["library_url"])
+    url = _shared["library_url"]
+    record, seconds = execute(run, url) if isinstance(run, Run) else execute_race(run, url)
     how = {"seconds": seconds, "commit": commit(), "machine": machine(), "versions": versions()}
     RecordStore(Path(_shared["folder"])).write(run, record, how)
     return run

@@ -41,6 +41,14 @@ SMALL = (Cell(2, 5), Cell(3, 5), Cell(4, 5))
 SHOWN = (Cell(5, 10), Cell(10, 10), Cell(10, 5))
 """M < N, M = N and M > N: the sizes of Figs. 5 to 11."""
 
+RACE_FAMILIES = ("uniform", "clustered", "deadline", "scarce")
+"""Of :mod:`app.simulation.generator`: as the paper's, towns and bases, deadlines, too little for all."""
+
+DRAWN = "drawn"
+
+RACE_PLACES = (*(f"{family}-{cell}" for family in RACE_FAMILIES for cell in GRID), DRAWN)
+"""Families and sizes of the race, and problems of no family."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scale:
@@ -68,6 +76,12 @@ class Scale:
         What each gets there.
     cells
         The sizes.
+    race_problems, race_seeds
+        Problems a place of the race, and seeds a problem.
+    race_evaluations
+        Plans that each may fly in the race of equal evaluations; in that of equal seconds each has `seconds`.
+    race_places
+        Families and sizes, by the names of :mod:`app.reproduction.race.places`.
     """
 
     problems: int = 10
@@ -82,10 +96,17 @@ class Scale:
     timed_problems: int = 10
     seconds: float = 1.0
     cells: tuple[Cell, ...] = (*GRID, *SMALL)
+    race_problems: int = 10
+    race_seeds: int = 5
+    race_evaluations: int = 20_000
+    race_places: tuple[str, ...] = RACE_PLACES
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            if each.name != "cells" and getattr(self, each.name) < (each.name == "seconds") * 1e-3:
+            if (
+                each.name not in ("cells", "race_places")
+                and getattr(self, each.name) < (each.name == "seconds") * 1e-3
+            ):
                 raise ImpossibleScale(f"{each.name} is {getattr(self, each.name)}")
         if self.problems < max(self.learning_problems, self.timed_problems):
             raise ImpossibleScale(
@@ -106,5 +127,9 @@ QUICK = Scale(
     nodes=20,
     timed_problems=1,
     seconds=0.3,
+    race_problems=2,
+    race_seeds=1,
+    race_evaluations=600,
+    race_places=("uniform-5x10", "clustered-5x10", "drawn"),
 )
 """What ``--quick`` runs: every experiment, in less than five minutes."""

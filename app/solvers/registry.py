@@ -69,9 +69,9 @@ class Algorithm:
         ``"module:Class"`` of its :class:`~app.solvers.protocol.Parameters`, in a module without torch.
     learns
         Whether its solutions carry a checkpoint that the library can hold.
-    papers
-        Whether it is one of the paper's own in every mode. Its answers are compared with the greedy rule's,
-        so they are its own also where they earn less.
+    comparison
+        Whether it is there to be compared with, as the paper's own are. Its answers are its own also where
+        they earn less than the greedy rule's.
     observes
         Whether it learns by the paper's observation: always, or in paper mode where it has one. Then it
         refuses fields of a problem whose reward does not follow from what is observed.
@@ -82,7 +82,7 @@ class Algorithm:
     solver: str
     parameters: str
     learns: bool = False
-    papers: bool = False
+    comparison: bool = False
     observes: bool = False
 
     def parameter_model(self) -> type[Parameters]:
@@ -127,7 +127,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "Q-learning over the joint action space (Eq. 15); small problems only, to compare with",
             "app.learning.dqn:Dqn",
             "app.learning.parameters:DqnParameters",
-            papers=True,
+            comparison=True,
             observes=True,
         ),
         Algorithm(
@@ -135,7 +135,7 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "The paper's genetic algorithm (Table 2)",
             "app.solvers.genetic:GeneticAlgorithm",
             "app.solvers.parameters:GeneticParameters",
-            papers=True,
+            comparison=True,
         ),
         Algorithm(
             "local_search",
@@ -161,6 +161,55 @@ ALGORITHMS: Mapping[str, Algorithm] = {
             "Every UAV in turn takes the visit that earns most at once; the yardstick",
             "app.solvers.greedy:Greedy",
             "app.solvers.parameters:GreedyParameters",
+        ),
+        Algorithm(
+            "particle_swarm",
+            "Particle swarm with variable neighbourhood search",
+            "app.solvers.swarms.particle_swarm:ParticleSwarm",
+            "app.solvers.comparison_parameters:ParticleSwarmParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "grey_wolf",
+            "Grey wolf optimisation",
+            "app.solvers.swarms.grey_wolf:GreyWolf",
+            "app.solvers.comparison_parameters:GreyWolfParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "beetle_antennae",
+            "Beetle swarm: a particle swarm whose members feel with two antennae",
+            "app.solvers.swarms.beetle_antennae:BeetleAntennae",
+            "app.solvers.comparison_parameters:BeetleAntennaeParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "ant_colony",
+            "Ant colony with division of labour by response thresholds, and circular competition",
+            "app.solvers.ant_colony.solver:AntColony",
+            "app.solvers.comparison_parameters:AntColonyParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "contract_net",
+            "Contract net: announcement, bids, award and exchange of contracts by messages between UAVs",
+            "app.solvers.markets.solver:ContractNetSolver",
+            "app.solvers.comparison_parameters:ContractNetParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "bundles",
+            "Consensus-based bundle algorithm: UAVs bid for bundles of areas and agree by messages",
+            "app.solvers.markets.solver:BundleSolver",
+            "app.solvers.comparison_parameters:BundleParameters",
+            comparison=True,
+        ),
+        Algorithm(
+            "semi_random_q",
+            "Q-learning with a table for every UAV and semi-random exploration",
+            "app.solvers.q_learning.solver:SemiRandomQLearning",
+            "app.solvers.comparison_parameters:SemiRandomQParameters",
+            comparison=True,
         ),
     )
 }
@@ -245,8 +294,8 @@ def unusable_architecture(problem: Problem) -> str | None:
 def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
     """Load an algorithm's implementation and build it, able to plan the unloading too.
 
-    No answer of it earns less than staying at home, and none but of the paper's own algorithms and modes less
-    than the greedy rule.
+    No answer of it earns less than staying at home, and none but of the algorithms for comparison and of
+    paper mode less than the greedy rule.
 
     Raises
     ------
@@ -255,8 +304,8 @@ def create_solver(name: str, parameters: Parameters, context: SolverContext) -> 
     """
     line = algorithm(name)
     solver = _resolve(line.solver)(parameters, context)
-    papers = line.papers or _mode_of(parameters) == _PAPER
-    floored = _resolve(_FLOOR)(solver, parameters, greedy=not papers, learns=line.learns)
+    own = line.comparison or _mode_of(parameters) == _PAPER
+    floored = _resolve(_FLOOR)(solver, parameters, greedy=not own, learns=line.learns)
     return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored))
 
 

@@ -213,6 +213,11 @@ print(json.dumps([before, compiled(), loaded]))
             ("qmix", QMIX),
             ("local_search", {"moves": 5000}),
             ("transfer_qmix", {"samples": 3, "n_epochs": 1, "polish_moves": 5000}),
+            ("particle_swarm", {"evaluations": 100}),
+            ("ant_colony", {"evaluations": 100}),
+            ("contract_net", {"evaluations": 100}),
+            ("bundles", {"evaluations": 100}),
+            ("semi_random_q", {"evaluations": 100}),
         )
     ]
     few = Problem(problem.uavs[:2], problem.targets[:4])

@@ -150,7 +150,7 @@ def test_the_command_that_is_recorded_runs_the_same_scale(tmp_path):
     )
     assert command_line(scale_of(True, {}, None)) == "python -m app reproduce --quick"
     results = results_of(tmp_path, {(CELL, "ga", 0, 123): 1.0})
-    assert "commit c0ffee, abacus, v1" in describe(scale, results)
+    assert "commit c0ffee, abacus, v1" in describe(command_line(scale), "ten problems", results.sources)
 
 
 def test_experiments_that_do_not_exist_are_refused():

@@ -27,6 +27,7 @@ SCALE = {
 }
 CELLS = "2x5 5x10"
 TIMED = ("timed", "timings", "library.sqlite3")
+PAPER = ("paper",)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def said():
 def out(scale, said, tmp_path_factory):
     """The folder after one run of the command, in two processes."""
     folder = tmp_path_factory.mktemp("first")
-    assert reproduce(scale, folder, 2, None, lambda done, word: said.append((done, word)))
+    assert reproduce(scale, folder, 2, None, lambda done, word: said.append((done, word)), PAPER)
     return folder
 
 
@@ -130,7 +131,7 @@ def again(scale, out, tmp_path_factory):
     other.write_text(json.dumps(changed), encoding="utf-8")
     kept = {file: file.stat().st_mtime_ns for file in kept}
     told = []
-    assert reproduce(scale, folder, 1, None, lambda done, word: told.append((done, word)))
+    assert reproduce(scale, folder, 1, None, lambda done, word: told.append((done, word)), PAPER)
     return SimpleNamespace(folder=folder, there=there, kept=kept, told=told)
 
 

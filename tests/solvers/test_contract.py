@@ -43,6 +43,18 @@ QUICK = {
     "local_search": {"moves": 3000, "restarts": 1},
     "exact": {"nodes": 20},
     "auto": {"moves": 3000, "restarts": 1, "policy": True},
+    **{
+        name: {"evaluations": 300}
+        for name in (
+            "particle_swarm",
+            "grey_wolf",
+            "beetle_antennae",
+            "ant_colony",
+            "contract_net",
+            "bundles",
+            "semi_random_q",
+        )
+    },
 }
 SHAPES = ((2, 3, 2), (3, 4, 1))
 

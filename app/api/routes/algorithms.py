@@ -28,6 +28,9 @@ class AlgorithmModel(AnswerModel):
     name: str = Field(description="As `algorithm` in `POST /allocate`")
     summary: str = Field(description="What it does")
     learns: bool = Field(description="Whether the library can hold what it learns")
+    comparison: bool = Field(
+        description="Whether it is there to be compared with: its plans may earn less than the greedy rule's"
+    )
     unsupported: list[UnsupportedModel] = Field(
         description="Fields of a problem that it refuses with 422; it takes all others"
     )
@@ -53,6 +56,7 @@ def _describe(algorithm: Algorithm) -> AlgorithmModel:
         name=algorithm.name,
         summary=algorithm.summary,
         learns=algorithm.learns,
+        comparison=algorithm.comparison,
         unsupported=[UnsupportedModel(**each._asdict()) for each in algorithm.unsupported()],
         parameters=model.model_json_schema(),
         defaults=model().model_dump(mode="json"),

@@ -22,8 +22,9 @@ const SAY_EVERY_MS = 6000;
 function makeForm() {
   const { algorithms, fields } = get();
   const names = algorithms.map(({ name }) => name);
+  const compared = new Set(algorithms.filter(({ comparison }) => comparison).map(({ name }) => name));
   const first = PREFERRED.find((name) => names.includes(name)) ?? names[0];
-  const choice = h("select", { name: "algorithm", onchange: () => choose() }, names.map((name) => h("option", { value: name, selected: name === first }, name)));
+  const choice = h("select", { name: "algorithm", onchange: () => choose() }, names.map((name) => h("option", { value: name, selected: name === first }, compared.has(name) ? `${name} (for comparison)` : name)));
   const summary = h("p", { class: "hint" });
   const place = h("div", {});
   const rest = Object.fromEntries(Object.entries(fields.request).filter(([name]) => !OWN_FIELDS.has(name)));

@@ -56,8 +56,8 @@ function choices() {
   const before = new Set([...parts.choices.querySelectorAll("input:checked")].map((box) => box.value));
   const wanted = before.size ? before : new Set(PREFERRED.filter((name) => algorithms.some((a) => a.name === name)));
   parts.choices.replaceChildren(
-    ...algorithms.map(({ name, summary }) =>
-      h("label", { class: "chip", title: summary },
+    ...algorithms.map(({ name, summary, comparison }) =>
+      h("label", { class: "chip", title: comparison ? `For comparison: ${summary}` : summary },
         h("input", { type: "checkbox", name: "algorithm", value: name, checked: wanted.has(name) }), " ", name)));
 }
 

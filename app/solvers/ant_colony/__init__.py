@@ -1,0 +1,1 @@
+"""Ant colony with division of labour, for comparison; see README.md."""

@@ -1,0 +1,1 @@
+"""Semi-random Q-learning, for comparison; see README.md."""

@@ -1,0 +1,1 @@
+"""Swarm heuristics over random keys, for comparison; see README.md."""
