@@ -72,7 +72,7 @@ def test_flight_files_of_a_local_problem_are_refused(client, problem):
     refused = take(client, answer, "qgc-plan")
 
     assert refused.status_code == 409
-    assert refused.json()["type"] == "plan-not-geographic"
+    assert refused.json()["type"] == "/docs/errors#plan-not-geographic"
     assert refused.json()["errors"] == [{"pointer": "/crs", "detail": "'local'; 'qgc-plan' needs 'wgs84'"}]
     assert take(client, answer, "csv").status_code == 200
     assert take(client, answer, "geojson").json()["coordinates_are"] == "x and y, local"
@@ -104,6 +104,6 @@ def test_job_without_plan_and_unknown_uav_are_told_apart(client, problem, flown)
     early = client.get(f"/jobs/{running['id']}/plan", params={"format": "csv"})
     client.delete(f"/jobs/{running['id']}")
 
-    assert (unknown.status_code, unknown.json()["type"]) == (404, "uav-not-found")
-    assert (nowhere.status_code, nowhere.json()["type"]) == (404, "job-not-found")
-    assert (early.status_code, early.json()["type"]) == (409, "no-plan")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#uav-not-found")
+    assert (nowhere.status_code, nowhere.json()["type"]) == (404, "/docs/errors#job-not-found")
+    assert (early.status_code, early.json()["type"]) == (409, "/docs/errors#no-plan")
