@@ -71,7 +71,9 @@ class ServiceError(ClientError):
         self.errors: list[FieldError] = problem.get("errors") or []
         self.request_id, self.retry_after_s = request_id, retry_after_s
         lines = [f"{each.get('parameter') or each['pointer']}: {each['detail']}" for each in self.errors]
-        super().__init__("\n  ".join([f"{status} {self.type}: {self.detail}", *lines]))
+        said = f"{status} {self.type}: {self.detail}"
+        # The detail has the first one in it, where it is about fields.
+        super().__init__("\n".join([said, *(line for line in lines if line not in said)]))
 
 
 class JobEnded(ClientError):

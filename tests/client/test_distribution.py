@@ -1,6 +1,7 @@
 """The client as a distribution of its own: installed without the service, typed, and run by the examples."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -106,6 +107,13 @@ def test_comparison(installed, service, tmp_path):
     for (problem, _), (mean, worst, best) in rows.items():
         assert worst <= mean <= best
         assert mean >= rows[problem, "greedy"][0] - 1e-3
+
+
+def test_the_page_shows_what_works(installed, service, tmp_path):
+    page = (CLIENT / "README.md").read_text("utf-8")
+    (shown,) = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    there = shown.replace("http://127.0.0.1:8000", service.url).replace("key=None", f"key={service.key!r}")
+    assert "'long-1'" in run(installed, tmp_path, "-c", there)
 
 
 def test_every_example_is_run():
