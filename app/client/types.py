@@ -1059,7 +1059,17 @@ class PlanAnswer(TypedDict):
     """When it begins, by the mission's clock."""
 
 
-PlanFormat = Literal["geojson", "qgc-plan", "qgc-wpl", "csv", "load-sheet", "html"]
+PlanFormat = Literal[
+    "geojson",
+    "qgc-plan",
+    "qgc-wpl",
+    "csv",
+    "load-sheet",
+    "html",
+    "briefing",
+    "kml",
+    "gpx",
+]
 """What a plan can be taken away as."""
 
 
@@ -2359,13 +2369,23 @@ class PlanChoices(TypedDict):
     """What a file of a plan is to be like."""
 
     uav: NotRequired[str | None]
-    """Id of the UAV of flight files; default: all that fly."""
+    """Id of the UAV whose flights these are; default: all."""
 
     altitude: NotRequired[float]
-    """Flight files: m."""
+    """Flights: m, of the first UAV that starts at a place."""
 
-    altitude_reference: NotRequired[AltitudeReference]
-    """Flight files: what the altitude is measured from."""
+    altitude_step: NotRequired[float]
+    """Flights: m that each further UAV of a place flies above the one before it."""
+
+    altitude_of: NotRequired[list[str] | None]
+    """Flights: altitude of a UAV in m, as `uav-7=90`; may be repeated."""
+
+    altitude_reference: NotRequired[AltitudeReference | None]
+    """Flights: what altitudes are measured from; default: home, but the terrain for flights of more than 5
+    km."""
+
+    launch_interval: NotRequired[float]
+    """Flights: seconds between two take-offs at one place; later ones wait."""
 
     delivery: NotRequired[Delivery]
     """Flight files: how material is left at a stop. payload-place: MAV_CMD_NAV_PAYLOAD_PLACE; servo:

@@ -144,6 +144,9 @@ def _files(recorder, job_id):
         ("qgc-plan", {"uav": "long-1", "delivery": "gripper"}),
         ("qgc-wpl", {"uav": "long-1"}),
         ("html", {}),
+        ("briefing", {}),
+        ("kml", {"uav": "long-1"}),
+        ("gpx", {"uav": "long-1"}),
     ):
         cut = (lambda text: text[:CHARACTERS] + CUT) if format == "html" else (lambda text: text)
         path = f"/jobs/{job_id}/plan"
