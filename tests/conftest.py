@@ -13,10 +13,11 @@ from xdist.scheduler import LoadFileScheduling
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 
-ONE_SERVICE = {"tests/api", "tests/dashboard"}
+ONE_SERVICE = {"tests/api", "tests/client", "tests/dashboard"}
 LONGEST = (
     "tests/api/",
     "tests/dashboard/",
+    "tests/client/",
     "tests/jobs/test_executors.py",
     "tests/reproduction/test_reproduction.py",
     "tests/test_readme.py",

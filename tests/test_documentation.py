@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import app
-from app.api.problem_details import MEANINGS, status_of
+from app.api.problem_types import PROBLEM_TYPES
 from app.domain.allocation import UnmetCode
 from app.domain.warnings import CODES
 from app.solvers.registry import ALGORITHMS
@@ -99,7 +99,7 @@ def test_the_version_of_the_package_is_this_one():
 
 
 def test_every_type_of_error_is_in_the_guide():
-    known = [(code, str(status_of(code).value)) for code in MEANINGS]
+    known = [(code, str(each.status)) for code, each in PROBLEM_TYPES.items()]
     assert [(cells[0].strip("| `"), cells[1]) for cells in rows("app/api/README.md", "Errors")] == known
 
 

@@ -15,6 +15,7 @@ from starlette.responses import HTMLResponse
 from starlette.staticfiles import StaticFiles
 
 from app.api.access.guard import SCHEME, document, needed_role
+from app.api.answer_examples import show_answers
 from app.api.batch_models import BatchLine
 from app.api.problem_details import ProblemDetails, responses
 from app.api.problem_models import largest, most_elements
@@ -103,6 +104,7 @@ def install_documentation(application: FastAPI, settings: Settings) -> None:
                     if "requestBody" in operation:
                         timeout = {str(k): v for k, v in responses("request-timeout").items()}
                         operation["responses"] = timeout | operation["responses"]
+                    show_answers(path, operation)
         return schema
 
     async def show_documentation(request: Request) -> HTMLResponse:

@@ -20,7 +20,8 @@ from starlette.routing import compile_path
 from app.api.access.guard import route_path
 from app.api.errors import InvalidBody, RequestError
 from app.api.head_requests import streams
-from app.api.problem_details import STATUS_OF_CODE, FieldError, problem_response
+from app.api.problem_details import FieldError, problem_response
+from app.api.problem_types import PROBLEM_TYPES
 from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
 from app.field_errors import in_words
@@ -150,7 +151,7 @@ def _request_error(request: Request, error: Exception) -> Response:
 
 def _allocator_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, AllocatorError)
-    if error.code not in STATUS_OF_CODE:
+    if error.code not in PROBLEM_TYPES:
         raise error
     return problem_response(
         error.code,

@@ -12,6 +12,7 @@ from starlette.responses import Response
 from app.api.allocation_models import AnswerModel
 from app.api.problem_details import FieldError
 from app.api.problem_models import ProblemModel
+from app.api.problem_types import type_of
 from app.jobs import model
 from app.jobs.model import Job, JobPage, JobStatus
 from app.jobs.stored_json import write
@@ -35,7 +36,9 @@ class ProgressModel(ProgressSummary):
 class JobErrorModel(AnswerModel):
     """Why a job failed."""
 
-    type: str = Field(description="Stable name, as the `type` of a problem")
+    type: str = Field(
+        description="Stable name, as the `type` of a problem", examples=[type_of("worker-lost")]
+    )
     detail: str = Field(description="What went wrong")
     errors: list[FieldError] = Field(description="Field by field, where that is known")
     details: dict[str, Any] = Field(description="Further facts, such as the `sizes` there are")
@@ -148,7 +151,7 @@ def _fields(job: model.JobSummary) -> dict[str, Any]:
         "error": None
         if error is None
         else JobErrorModel(
-            type=error["code"],
+            type=type_of(error["code"]),
             detail=error["detail"],
             errors=[FieldError(**violation) for violation in error["violations"]],
             details=error["details"],

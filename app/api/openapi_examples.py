@@ -170,9 +170,6 @@ EVENT_EXAMPLES: dict[str, Example] = {
     ),
 }
 
-ALLOCATION_ANSWER: dict[str, Any] = json.loads((_FOLDER / "answers" / "small-greedy.json").read_text("utf-8"))
-"""What the greedy rule answers to the small task; a test compares."""
-
 REGISTRATION_EXAMPLES: dict[str, Example] = {
     "train": Example(
         summary="Train a source policy and register it at the end",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from app.cli.assistants import serve_assistants
 from app.cli.flying import fly
 from app.cli.keys import create_key, list_keys, revoke_key
 from app.cli.reproduction import reproduce
@@ -16,6 +17,7 @@ application = typer.Typer(
 for command in (serve, allocate, evaluate, train, train_universal, reproduce, export, backup, fly):
     application.command()(command)
 application.command("compile")(compile_code)
+application.command("mcp")(serve_assistants)
 
 keys = typer.Typer(help="API keys: make, list, revoke.", no_args_is_help=True)
 keys.command("create")(create_key)

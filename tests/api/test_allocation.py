@@ -183,7 +183,7 @@ def test_every_algorithm_has_an_example_that_is_taken(client):
         expected = {200, 409} if name == "transfer_qmix" else {200}
         assert response.status_code in expected, (name, response.text)
         if response.status_code == 409:
-            assert response.json()["type"] == "no-compatible-source"
+            assert response.json()["type"] == "/docs/errors#no-compatible-source"
 
 
 def test_examples_can_be_sent_as_they_are(client):

@@ -43,9 +43,9 @@ def test_what_is_wrong_with_one_is_told_in_its_line(client, item):
     assert "id" not in lines[0]
     assert [line.get("problem", {}).get("type") for line in lines] == [
         None,
-        "unknown-algorithm",
-        "invalid-problem",
-        "invalid-parameters",
+        "/docs/errors#unknown-algorithm",
+        "/docs/errors#invalid-problem",
+        "/docs/errors#invalid-parameters",
         None,
     ]
     alone = client.post("/allocate", json=problems[1]).json()
@@ -55,7 +55,7 @@ def test_what_is_wrong_with_one_is_told_in_its_line(client, item):
 def test_a_body_of_the_wrong_shape_is_refused_as_a_whole(client, item):
     bad = {**item, "uavs": [{**item["uavs"][0], "speed": -1}]}
     refused = client.post("/allocate/batch", json={"problems": [item, bad]})
-    assert (refused.status_code, refused.json()["type"]) == (422, "invalid-request")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#invalid-request")
     assert refused.json()["errors"][0]["pointer"] == "/problems/1/uavs/0/speed"
     assert client.post("/allocate/batch", json={"problems": []}).status_code == 422
 
@@ -63,7 +63,7 @@ def test_a_body_of_the_wrong_shape_is_refused_as_a_whole(client, item):
 def test_too_many_are_refused_and_more_than_there_are_places_wait(narrow, item):
     client = narrow.await_ready().client
     refused = client.post("/allocate/batch", json={"problems": [item] * 4})
-    assert (refused.status_code, refused.json()["type"]) == (422, "batch-too-large")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#batch-too-large")
     described = client.get("/openapi.json").json()["components"]["schemas"]["BatchRequest"]
     assert refused.json()["limit"] == described["properties"]["problems"]["maxItems"] == 3
     # Two batches of three, of which four wait at least: one has to be patient.
@@ -110,7 +110,7 @@ def test_a_batch_goes_on_without_its_client_and_comes_again_with_its_key(client,
     other = [{**problems[0], "seed": 99}, *problems[1:]]
     with client.stream("POST", "/allocate/batch", json={"problems": other}, headers=headers) as response:
         again = in_order(lines_of(response))
-    assert again[0]["problem"]["type"] == "idempotency-key-reused"
+    assert again[0]["problem"]["type"] == "/docs/errors#idempotency-key-reused"
     assert again[1:] == lines[1:]
 
 

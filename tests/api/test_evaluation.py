@@ -39,7 +39,7 @@ def test_every_action_that_breaks_a_rule_is_named_with_its_figures(client):
     answer = client.post("/evaluate", json={**short, "assignment": [[0, 0], [7, 3], [1, 1]]})
     assert answer.status_code == 422
     problem = answer.json()
-    assert problem["type"] == "illegal-plan"
+    assert problem["type"] == "/docs/errors#illegal-plan"
     assert [each["rule"] for each in problem["breaches"]] == ["range", "no_such_action", "returning"]
     first = problem["breaches"][0]
     assert (first["step"], first["uav_id"], first["target_id"], first["had"]) == (1, "uav-1", "area-1", 1.2)

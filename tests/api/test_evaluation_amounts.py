@@ -62,7 +62,7 @@ def test_what_cannot_be_loaded_or_unloaded_is_refused(client, loaded, delivered,
     }
     answer = client.post("/evaluate", json=body)
     assert answer.status_code == 422
-    assert answer.json()["type"].endswith("illegal-plan")
+    assert answer.json()["type"].endswith("/docs/errors#illegal-plan")
     assert says in answer.json()["detail"]
 
 

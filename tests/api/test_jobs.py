@@ -237,7 +237,7 @@ def test_retry_with_the_same_key_is_the_same_job(client, problem):
     assert first.json() == again.json()
     assert later.json()["id"] == first.json()["job_id"]
     assert other.status_code == 422
-    assert other.json()["type"] == "idempotency-key-reused"
+    assert other.json()["type"] == "/docs/errors#idempotency-key-reused"
 
 
 def test_full_queue_says_when_to_come_back(client, problem, follow):
@@ -257,7 +257,7 @@ def test_full_queue_says_when_to_come_back(client, problem, follow):
 
     assert len(jobs) == 4
     assert refused.status_code == 429
-    assert refused.json()["type"] == "queue-full"
+    assert refused.json()["type"] == "/docs/errors#queue-full"
     assert int(refused.headers["retry-after"]) >= 1
 
 
@@ -280,7 +280,7 @@ def test_job_that_was_cancelled_before_it_began_has_no_plan(client, problem, fol
         follow(job_id)
 
     assert answers[0].status_code == 409
-    assert answers[0].json()["type"] == "job-cancelled"
+    assert answers[0].json()["type"] == "/docs/errors#job-cancelled"
     assert answers[0].json()["job_id"] == queued
 
 

@@ -170,7 +170,7 @@ def test_policies_that_cannot_serve_a_task_are_not_offered(client, policy):
         "parameters": {"source": policy["id"]},
     }
     refused = client.post("/allocate", json=body)
-    assert (refused.status_code, refused.json()["type"]) == (422, "invalid-parameters")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#invalid-parameters")
     assert refused.json()["errors"][0]["pointer"] == "/parameters/source"
 
 
@@ -182,7 +182,7 @@ def test_transfer_by_the_paper_needs_the_same_size(client, policy):
     )
 
     assert response.status_code == 409
-    assert response.json()["type"] == "no-compatible-source"
+    assert response.json()["type"] == "/docs/errors#no-compatible-source"
     assert [2, 3, 2] in response.json()["sizes"]
 
 
@@ -192,7 +192,7 @@ def test_source_that_does_not_exist(client):
     response = client.post("/allocate", json=body)
 
     assert response.status_code == 422
-    assert response.json()["type"] == "invalid-parameters"
+    assert response.json()["type"] == "/docs/errors#invalid-parameters"
     assert response.json()["errors"][0]["pointer"] == "/parameters/source"
 
 
@@ -277,8 +277,8 @@ def test_job_that_learned_nothing_is_not_registered(client):
     response = client.post("/library", json={"name": "x", "job_id": job_id})
     unknown = client.post("/library", json={"name": "x", "job_id": "0" * 32})
 
-    assert (response.status_code, response.json()["type"]) == (409, "job-without-checkpoint")
-    assert (unknown.status_code, unknown.json()["type"]) == (404, "job-not-found")
+    assert (response.status_code, response.json()["type"]) == (409, "/docs/errors#job-without-checkpoint")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#job-not-found")
 
 
 def test_what_an_allocation_learns_is_kept_only_where_that_is_asked_for(client):
@@ -287,7 +287,7 @@ def test_what_an_allocation_learns_is_kept_only_where_that_is_asked_for(client):
 
     refused = client.post("/library", json={"name": "x", "job_id": job_id})
 
-    assert (refused.status_code, refused.json()["type"]) == (409, "job-without-checkpoint")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/docs/errors#job-without-checkpoint")
     assert '"keep_checkpoint": true' in refused.json()["detail"]
 
 
@@ -334,7 +334,7 @@ def test_damaged_checkpoint_is_refused(client, policy, change):
     response = client.post("/library", json=body)
 
     assert response.status_code == 422
-    assert response.json()["type"] == "invalid-checkpoint"
+    assert response.json()["type"] == "/docs/errors#invalid-checkpoint"
     assert response.json()["errors"][0]["pointer"] == "/checkpoint"
 
 
@@ -347,4 +347,4 @@ def test_checkpoint_of_another_size_is_refused(client, policy):
     )
 
     assert response.status_code == 422
-    assert response.json()["type"] == "invalid-checkpoint"
+    assert response.json()["type"] == "/docs/errors#invalid-checkpoint"

@@ -94,7 +94,7 @@ def test_a_plan_is_proposed_and_accepted(begin):
     assert mission.get("/proposals")["proposals"][0]["status"] == "accepted"
     assert {stop for route in mission.routes() for stop in route} == {"area-1", "area-2", "area-3"}
     again = mission.send("proposal_accepted", proposal=proposal["number"])
-    assert (again.status_code, again.json()["type"]) == (409, "proposal-closed")
+    assert (again.status_code, again.json()["type"]) == (409, "/docs/errors#proposal-closed")
 
 
 def test_plans_take_effect_by_themselves_where_that_is_asked_for(begin):
@@ -177,7 +177,7 @@ def test_the_same_event_is_kept_once(begin):
     other = mission.send("areas_added", 1.0, id="call-1", targets=[new | {"x": 2.0}])
     assert (first.status_code, again.status_code) == (201, 200)
     assert again.json() == first.json()
-    assert (other.status_code, other.json()["type"]) == (422, "event-id-reused")
+    assert (other.status_code, other.json()["type"]) == (422, "/docs/errors#event-id-reused")
     assert other.json()["errors"][0]["pointer"] == "/id"
     assert len(mission.get()["state"]["problem"]["targets"]) == 4
 
@@ -215,7 +215,7 @@ def test_what_cannot_be_is_refused(begin, type_, fields, pointer, says):
     mission.tell("clock", 1.0)
     before = mission.settle()
     refused = mission.send(type_, **fields)
-    assert (refused.status_code, refused.json()["type"]) == (422, "event-refused")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#event-refused")
     (error,) = refused.json()["errors"]
     assert error["pointer"] == pointer
     assert says in error["detail"]
@@ -225,14 +225,14 @@ def test_what_cannot_be_is_refused(begin, type_, fields, pointer, says):
 def test_fields_are_checked_as_those_of_a_problem_are(begin):
     mission = begin()
     wrong = mission.send("level_changed", target_id="area-1", level=-1.0, more=1)
-    assert (wrong.status_code, wrong.json()["type"]) == (422, "invalid-request")
+    assert (wrong.status_code, wrong.json()["type"]) == (422, "/docs/errors#invalid-request")
     assert {each["pointer"] for each in wrong.json()["errors"]} == {"/level", "/more"}
     control = mission.send("clock", id="a\u009b")
     assert (control.status_code, control.json()["errors"][0]["pointer"]) == (422, "/id")
     unknown = mission.send("earthquake")
     assert unknown.status_code == 422
     assert "uav_lost" in unknown.json()["detail"]
-    assert mission.client.get("/missions/" + "0" * 32).json()["type"] == "mission-not-found"
+    assert mission.client.get("/missions/" + "0" * 32).json()["type"] == "/docs/errors#mission-not-found"
 
 
 def test_positions_count_with_the_next_event(begin):
@@ -346,17 +346,17 @@ def test_missions_are_listed_and_deleted(begin, client):
     following = client.get("/missions", params={"limit": 1, "cursor": page["next_cursor"]}).json()
     assert [each["id"] for each in following["missions"]] == [first.id]
     assert client.delete(first.path).status_code == 204
-    assert client.delete(first.path).json()["type"] == "mission-not-found"
+    assert client.delete(first.path).json()["type"] == "/docs/errors#mission-not-found"
     assert first.send("clock").status_code == 404
 
 
 def test_a_plan_that_breaks_a_rule_begins_nothing(client):
     body = {"problem": {**SMALL, "start_plan": [[0, 0], [0, 0], [0, 0]]}, **QUICK}
     refused = client.post("/missions", json=body)
-    assert (refused.status_code, refused.json()["type"]) == (422, "illegal-plan")
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#illegal-plan")
     assert refused.json()["errors"][0]["pointer"].startswith("/problem/start_plan")
     unknown = client.post("/missions", json={"problem": SMALL, "algorithm": "magic"})
-    assert unknown.json()["type"] == "unknown-algorithm"
+    assert unknown.json()["type"] == "/docs/errors#unknown-algorithm"
 
 
 def test_change_weight_keeps_the_plan_in_force(begin):

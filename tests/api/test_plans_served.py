@@ -72,7 +72,7 @@ def test_flight_files_of_a_local_problem_are_refused(client, problem):
     refused = take(client, answer, "qgc-plan")
 
     assert refused.status_code == 409
-    assert refused.json()["type"] == "plan-not-geographic"
+    assert refused.json()["type"] == "/docs/errors#plan-not-geographic"
     assert refused.json()["errors"] == [{"pointer": "/crs", "detail": "'local'; 'qgc-plan' needs 'wgs84'"}]
     assert take(client, answer, "csv").status_code == 200
     assert take(client, answer, "geojson").json()["coordinates_are"] == "x and y, local"
@@ -86,7 +86,10 @@ def test_flight_files_of_a_local_problem_are_refused(client, problem):
         ({"altitude": 1e9}, "altitude"),
         ({"delivery": "catapult"}, "delivery"),
         ({"servo_pwm": 100}, "servo_pwm"),
-        ({"format": "kml"}, "format"),
+        ({"format": "dxf"}, "format"),
+        ({"altitude_step": -1}, "altitude_step"),
+        ({"launch_interval": 1e9}, "launch_interval"),
+        ({"altitude_of": "long-1"}, "altitude_of/0"),
     ],
 )
 def test_choice_out_of_range_is_named(client, flown, choices, parameter):
@@ -104,6 +107,36 @@ def test_job_without_plan_and_unknown_uav_are_told_apart(client, problem, flown)
     early = client.get(f"/jobs/{running['id']}/plan", params={"format": "csv"})
     client.delete(f"/jobs/{running['id']}")
 
-    assert (unknown.status_code, unknown.json()["type"]) == (404, "uav-not-found")
-    assert (nowhere.status_code, nowhere.json()["type"]) == (404, "job-not-found")
-    assert (early.status_code, early.json()["type"]) == (409, "no-plan")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#uav-not-found")
+    assert (nowhere.status_code, nowhere.json()["type"]) == (404, "/docs/errors#job-not-found")
+    assert (early.status_code, early.json()["type"]) == (409, "/docs/errors#no-plan")
+
+
+@pytest.mark.parametrize(
+    ("format", "media_type"),
+    [
+        ("briefing", "text/plain"),
+        ("kml", "application/vnd.google-earth.kml+xml"),
+        ("gpx", "application/gpx+xml"),
+    ],
+)
+def test_flights_of_all_uavs_come_in_one_document(client, flown, problem, format, media_type):
+    _, answer = flown
+    flying = [route["uav_id"] for route in answer["routes"] if route["stops"]]
+    response = take(client, answer, format, altitude=40, altitude_step=5, launch_interval=90)
+    assert response.headers["content-type"].split(";")[0] == media_type
+    assert all(uav_id in response.text for uav_id in flying)
+    alone = take(client, answer, format, altitude=40, altitude_step=5, launch_interval=90, uav=flying[2])
+    assert "50 m above the ground below" in alone.text
+    assert "it takes off 180 s later than planned" in alone.text
+    assert flying[1] not in alone.text
+    own = take(client, answer, format, uav=flying[2], altitude_of=[f"{flying[2]}=77.5", f"{flying[0]}=60"])
+    assert "77.5 m above" in own.text
+    high = take(client, answer, format, altitude_of=f"{flying[0]}=10001")
+    assert (high.status_code, high.json()["type"]) == (409, "/docs/errors#plan-out-of-range")
+    assert f"'{flying[0]}' would fly at 10001 m, which is not in 1..10000" in high.json()["detail"]
+    local = client.post("/allocate", json={**problem, "algorithm": "greedy"}).json()
+    assert take(client, local, format).json()["type"] == "/docs/errors#plan-not-geographic"
+    unknown = take(client, answer, format, altitude_of="nobody=50")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#uav-not-found")
+    assert unknown.json()["errors"][0]["parameter"] == "altitude_of"

@@ -155,7 +155,7 @@ def test_everything_of_an_earlier_version_is_there_and_what_was_begun_is_done(st
 def test_it_takes_jobs_before_it_is_ready(stopped):
     assert stopped.cold.status_code in (200, 503)
     if stopped.cold.status_code == 503:
-        assert stopped.cold.json()["type"] == "not-ready"
+        assert stopped.cold.json()["type"] == "/docs/errors#not-ready"
         assert stopped.cold.headers["retry-after"] == "1"
     assert stopped.at_once.status_code == 200
 
@@ -163,7 +163,7 @@ def test_it_takes_jobs_before_it_is_ready(stopped):
 def test_a_clean_stop_ends_open_streams_and_says_what_it_leaves(stopped):
     assert stopped.ended in ENDED
     for line in stopped.rest:
-        assert "allocation" in line or line["problem"]["type"] == "draining"
+        assert "allocation" in line or line["problem"]["type"] == "/docs/errors#draining"
 
 
 def test_the_next_has_jobs_and_library_and_goes_on_with_what_ran(stopped, last):
@@ -226,8 +226,8 @@ def test_a_stop_answers_all_who_wait_as_problems_and_is_over_within_its_grace(la
     assert last.process.wait(60) in ENDED
 
     for name in ("runs", "waits"):
-        assert (answers[name].status_code, answers[name].json()["type"]) == (503, "draining")
+        assert (answers[name].status_code, answers[name].json()["type"]) == (503, "/docs/errors#draining")
         assert int(answers[name].headers["retry-after"]) > 0
-    assert [line["problem"]["type"] for line in answers["batch"]] == ["draining"]
+    assert [line["problem"]["type"] for line in answers["batch"]] == ["/docs/errors#draining"]
     assert refused.startswith(b"HTTP/1.1 503 ")
-    assert b'"type":"draining"' in refused
+    assert b'"type":"/docs/errors#draining"' in refused

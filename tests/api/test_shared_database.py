@@ -72,7 +72,7 @@ def test_a_server_that_is_away_is_said_and_come_through(two, server, problem):
     server.stop()
     assert other.get("/readyz").status_code == 503
     away = other.post("/allocate", json=slow)
-    assert (away.status_code, away.json()["type"]) == (503, "store-unavailable")
+    assert (away.status_code, away.json()["type"]) == (503, "/docs/errors#store-unavailable")
     assert away.headers["Retry-After"] == "1"
     server.start()
     ended = finished(one, job["id"])

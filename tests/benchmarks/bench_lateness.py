@@ -94,7 +94,7 @@ def _rows(
                 print(
                     f"{name:<14} {size:>9} {limit_s:>8g} {response.status} {told['type']}: {told['detail']}"
                 )
-                if told["type"] == "problem-too-large":
+                if told["type"] == "/docs/errors#problem-too-large":
                     return late
                 return late + 1
         cuts = statistics.quantiles(lateness, n=100, method="inclusive")

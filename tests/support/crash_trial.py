@@ -295,7 +295,7 @@ def _fault(job: dict[str, Any]) -> str | None:
         return "has succeeded without a plan"
     if job["status"] == "failed" and not (job["error"] and job["error"]["detail"]):
         return "has failed without a reason"
-    if job["status"] == "failed" and job["error"]["type"] != "worker-lost":
+    if job["status"] == "failed" and job["error"]["type"] != "/docs/errors#worker-lost":
         return f"has failed with {job['error']['type']}: {job['error']['detail']}"
     return None
 

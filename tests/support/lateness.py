@@ -33,7 +33,7 @@ class Answered:
     @property
     def refused(self) -> bool:
         """Whether the algorithm cannot hold the problem."""
-        return self.status == 422 and self.answer["type"] == "problem-too-large"
+        return self.status == 422 and self.answer["type"] == "/docs/errors#problem-too-large"
 
 
 def ask(port: int, request: dict[str, Any]) -> Answered:

@@ -73,7 +73,7 @@ class MixedLoad:
 
     def note(self, request: str, response: httpx.Response) -> None:
         """Count an answer and judge it; who is told to come back later does so."""
-        kind = "" if response.status_code < 400 else response.json()["type"]
+        kind = "" if response.status_code < 400 else response.json()["type"].rpartition("#")[2]
         told = f"{response.status_code} {kind}".strip()
         with self._lock:
             self.answers[f"{request}: {told}"] += 1
@@ -254,7 +254,7 @@ class _Client:
         """Send what is refused; that it is refused with 4xx is what is counted."""
         body = self._rng.choice((b"{", b'{"uavs": []}', b"[" * 5000, b'{"uavs": NaN}'))
         response = self._http.post("/allocate", content=body, headers={"Content-Type": "application/json"})
-        kind = response.json()["type"]
+        kind = response.json()["type"].rpartition("#")[2]
         self._load.count(f"nonsense: {response.status_code} {kind}")
         if response.status_code not in (400, 422):
             self._load.note("nonsense", response)

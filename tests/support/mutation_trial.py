@@ -101,7 +101,7 @@ def _fault(response: http.client.HTTPResponse, problem: dict[str, Any]) -> str |
         return "no request id"
     if response.status == 429 and not response.getheader("Retry-After"):
         return "no Retry-After"
-    if problem["type"] in NAMES_FIELDS:
+    if problem["type"].rpartition("#")[2] in NAMES_FIELDS:
         errors = problem.get("errors", [])
         if not errors or not all("pointer" in each and each["detail"] for each in errors):
             return "no field is named"

@@ -20,7 +20,8 @@ from structlog.contextvars import bind_contextvars
 
 from app.api.access.hosts import Hosts
 from app.api.access.keys import ApiKey, KeyStore, Role, recognise
-from app.api.problem_details import ERROR_PAGE, problem_response, responses
+from app.api.problem_details import problem_response, responses
+from app.api.problem_types import ERROR_PAGE
 
 OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", ERROR_PAGE, "/openapi.json", "/favicon.ico"})
 """What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""

@@ -47,11 +47,11 @@ class NotGeographic(PlanUnavailable):
 class UnknownUAV(PlanUnavailable):
     """No UAV of the plan has that id."""
 
-    def __init__(self, uav_id: str) -> None:
+    def __init__(self, uav_id: str, parameter: str = "uav") -> None:
         super().__init__(
             "uav-not-found",
-            f"uav: no UAV of the plan has the id {uav_id!r}",
-            errors=[FieldError(pointer="", detail=f"{uav_id!r} is not in the plan", parameter="uav")],
+            f"{parameter}: no UAV of the plan has the id {uav_id!r}",
+            errors=[FieldError(pointer="", detail=f"{uav_id!r} is not in the plan", parameter=parameter)],
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from app.api.plan_formats.flights import Flight, FlownReload
@@ -24,11 +25,18 @@ _ALTITUDE_MODE = {AltitudeReference.HOME: 1, AltitudeReference.TERRAIN: 4}
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 
-def plan_file(flight: Flight, choices: FlightChoices) -> str:
+def plan_file(flight: Flight, choices: FlightChoices, warnings: Sequence[str] = ()) -> str:
     """Write a ``.plan``, version 1, with a mission of version 2 of simple items; no rally points.
 
     No-fly zones are polygons of its fence that must not be entered. What a mission cannot say is in
     ``notes``, a member that ground stations do not read.
+
+    Parameters
+    ----------
+    flight, choices
+        What is written, and what the plan leaves open.
+    warnings
+        For the pilot, also in ``notes``.
 
     Raises
     ------
@@ -56,7 +64,7 @@ def plan_file(flight: Flight, choices: FlightChoices) -> str:
             "items": [_simple_item(number, item, altitude_mode) for number, item in enumerate(items, 1)],
         },
     }
-    notes = _notes(flight)
+    notes = [*_notes(flight), *(f"Warning: {warning}" for warning in warnings)]
     if notes:
         content["notes"] = notes
     return json.dumps(content, indent=2, allow_nan=False) + "\n"

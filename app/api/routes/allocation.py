@@ -14,7 +14,7 @@ from app.api.job_answers import accepted, gone, idempotency, written_answer_of
 from app.api.job_kinds import ALLOCATE
 from app.api.job_models import JobModel
 from app.api.json_body import JsonRoute
-from app.api.openapi_examples import ALLOCATION_ANSWER, ALLOCATION_EXAMPLES
+from app.api.openapi_examples import ALLOCATION_EXAMPLES
 from app.api.preferences import Preferences
 from app.api.problem_details import responses
 from app.api.routes.parameters import LOCATION, IdempotencyKey, Prefer
@@ -39,7 +39,6 @@ CLIENT_HAS_GONE = 499
     response_model=Allocation,
     response_description="The plan",
     responses={
-        200: {"content": {"application/json": {"example": ALLOCATION_ANSWER}}},
         202: {
             "model": JobModel,
             "description": "Accepted: the job goes on, see `Location`",

@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
 from fastapi import APIRouter, Query
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.job_models import result_of
 from app.api.plan_formats import mission
 from app.api.plan_formats.archive import zip_archive
+from app.api.plan_formats.briefing import briefing
 from app.api.plan_formats.csv_table import csv_table
 from app.api.plan_formats.errors import NoPlan, NotGeographic, NothingToFly, UnknownUAV
-from app.api.plan_formats.flights import Flight
 from app.api.plan_formats.flown_plan import FlownPlan, flown_plan
 from app.api.plan_formats.geojson import MEDIA_TYPE as GEOJSON
 from app.api.plan_formats.geojson import geojson
+from app.api.plan_formats.launches import (
+    MAX_INTERVAL_S,
+    MAX_STEP_M,
+    TERRAIN_BEYOND_KM,
+    PlannedFlight,
+    Separation,
+    planned_flights,
+)
 from app.api.plan_formats.load_sheet import load_sheet
+from app.api.plan_formats.map_files import GPX_TYPE, KML_TYPE, gpx, kml
 from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
 from app.api.plan_formats.printed_page import printed_page
 from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
@@ -42,6 +52,9 @@ class PlanFormat(StrEnum):
     CSV = "csv"
     LOAD_SHEET = "load-sheet"
     HTML = "html"
+    BRIEFING = "briefing"
+    KML = "kml"
+    GPX = "gpx"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +67,19 @@ class _Document:
 
 
 @dataclass(frozen=True, slots=True)
+class _FlightsDocument:
+    """A format of all flights, as they are to be flown."""
+
+    write: Callable[[FlownPlan, Sequence[PlannedFlight]], str]
+    media_type: str
+    ending: str
+
+
+@dataclass(frozen=True, slots=True)
 class _FlightFile:
     """A format of one flight."""
 
-    write: Callable[[Flight, FlightChoices], str]
+    write: Callable[[PlannedFlight], str]
     media_type: str
     ending: str
 
@@ -72,14 +94,22 @@ def _for_spreadsheets(write: Callable[[FlownPlan], str]) -> _Document:
     return _Document(marked, "text/csv; charset=utf-8", "csv")
 
 
-_FORMATS: dict[PlanFormat, _Document | _FlightFile] = {
+_FORMATS: dict[PlanFormat, _Document | _FlightsDocument | _FlightFile] = {
     PlanFormat.GEOJSON: _Document(geojson, GEOJSON, "geojson"),
     PlanFormat.CSV: _for_spreadsheets(csv_table),
     PlanFormat.LOAD_SHEET: _for_spreadsheets(load_sheet),
     PlanFormat.HTML: _Document(printed_page, "text/html; charset=utf-8", "html"),
-    PlanFormat.QGC_PLAN: _FlightFile(plan_file, "application/json", "plan"),
-    PlanFormat.QGC_WPL: _FlightFile(waypoint_file, "text/plain; charset=utf-8", "waypoints"),
+    PlanFormat.BRIEFING: _FlightsDocument(briefing, "text/plain; charset=utf-8", "txt"),
+    PlanFormat.KML: _FlightsDocument(kml, KML_TYPE, "kml"),
+    PlanFormat.GPX: _FlightsDocument(gpx, GPX_TYPE, "gpx"),
+    PlanFormat.QGC_PLAN: _FlightFile(
+        lambda each: plan_file(each.flight, each.choices, each.warnings), "application/json", "plan"
+    ),
+    PlanFormat.QGC_WPL: _FlightFile(
+        lambda each: waypoint_file(each.flight, each.choices), "text/plain; charset=utf-8", "waypoints"
+    ),
 }
+_CHOICES, _APART = FlightChoices(), Separation()
 _ZIP = "application/zip"
 _TEXT = {"schema": {"type": "string"}}
 _OBJECT = {"schema": {"type": "object"}}
@@ -98,6 +128,8 @@ _OBJECT = {"schema": {"type": "object"}}
                 "text/plain": _TEXT,
                 "text/csv": _TEXT,
                 "text/html": _TEXT,
+                KML_TYPE: _TEXT,
+                GPX_TYPE: _TEXT,
                 _ZIP: {"schema": {"type": "string", "format": "binary"}},
             },
             "headers": {
@@ -123,14 +155,17 @@ async def get_plan(
         Query(
             description="geojson, csv, html (a page to print): the whole plan. load-sheet: CSV of what each "
             "UAV takes up before each flight. "
+            "briefing (text), kml, gpx: all flights with their altitudes, times and warnings. "
             "qgc-plan (QGroundControl's .plan), qgc-wpl (QGC WPL 110 waypoints): "
-            "flight files, one a flight, for problems with crs wgs84"
+            "flight files, one a flight. These five are for problems with crs wgs84"
         ),
     ],
     uav: Annotated[
         str | None,
         Query(
-            min_length=1, max_length=100, description="Id of the UAV of flight files; default: all that fly"
+            min_length=1,
+            max_length=100,
+            description="Id of the UAV whose flights these are; default: all",
         ),
     ] = None,
     altitude: Annotated[
@@ -139,12 +174,38 @@ async def get_plan(
             ge=mission.MIN_ALTITUDE_M,
             le=mission.MAX_ALTITUDE_M,
             allow_inf_nan=False,
-            description="Flight files: m",
+            description="Flights: m, of the first UAV that starts at a place",
         ),
-    ] = 50.0,
+    ] = _CHOICES.altitude_m,
+    altitude_step: Annotated[
+        float,
+        Query(
+            ge=0,
+            le=MAX_STEP_M,
+            allow_inf_nan=False,
+            description="Flights: m that each further UAV of a place flies above the one before it",
+        ),
+    ] = _APART.altitude_step_m,
+    altitude_of: Annotated[
+        list[Annotated[str, Field(max_length=120, pattern=r"^.+=\d+(\.\d+)?$")]] | None,
+        Query(max_length=1000, description="Flights: altitude of a UAV in m, as `uav-7=90`; may be repeated"),
+    ] = None,
     altitude_reference: Annotated[
-        AltitudeReference, Query(description="Flight files: what the altitude is measured from")
-    ] = AltitudeReference.HOME,
+        AltitudeReference | None,
+        Query(
+            description="Flights: what altitudes are measured from; default: home, but the terrain for "
+            f"flights of more than {TERRAIN_BEYOND_KM:g} km"
+        ),
+    ] = None,
+    launch_interval: Annotated[
+        float,
+        Query(
+            ge=0,
+            le=MAX_INTERVAL_S,
+            allow_inf_nan=False,
+            description="Flights: seconds between two take-offs at one place; later ones wait",
+        ),
+    ] = _APART.launch_interval_s,
     delivery: Annotated[
         Delivery,
         Query(
@@ -183,13 +244,15 @@ async def get_plan(
 ) -> Response:
     """Write a plan in a format of the field.
 
+    UAVs of one place fly one above the other and take off one after the other; what that makes late is among
+    the warnings of a flight, which are in the briefing, in maps and in the notes of a `.plan`.
+
     Before a flight file is written, every position, altitude, speed and stay is checked against what the
     format holds, and at every stop that the UAV is within its range; all that is wrong is listed. A UAV that
     is on its way already (it has flown, or is not where it started) gets a mission without a take-off.
     """
     choices = FlightChoices(
         altitude_m=altitude,
-        altitude_reference=altitude_reference,
         delivery=delivery,
         end=end,
         servo_channel=servo_channel,
@@ -197,11 +260,16 @@ async def get_plan(
         gripper=gripper,
         max_descent_m=max_descent,
     )
+    told = (each.rpartition("=") for each in altitude_of or ())
+    own = {uav_id: float(metres) for uav_id, _, metres in told}
+    separation = Separation(altitude_step, launch_interval, own, altitude_reference)
     job = await services.jobs.get(job_id)
-    return await run_in_threadpool(_file, job, format, uav, choices)
+    return await run_in_threadpool(_file, job, format, uav, choices, separation)
 
 
-def _file(job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices) -> Response:
+def _file(
+    job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices, separation: Separation
+) -> Response:
     answer = result_of(job)
     if answer is None or "routes" not in answer:
         raise NoPlan(job.id, job.kind, job.status.value)
@@ -214,30 +282,38 @@ def _file(job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices)
         return _response(kind.write(plan), kind.media_type, f"plan-{job.id[:8]}{sheet}.{kind.ending}", how)
     if plan.problem.crs != "wgs84":
         raise NotGeographic(format.value, plan.problem.crs)
-    flights = _flights(plan, uav)
+    known = {each.id for each in plan.problem.uavs}
+    if unknown := [each for each in separation.altitude_of if each not in known]:
+        raise UnknownUAV(unknown[0], "altitude_of")
+    flights = _flights(plan, uav, choices, separation)
+    if isinstance(kind, _FlightsDocument):
+        whose = "" if uav is None else f"-{flights[0].flight.route + 1:03d}"
+        name = f"plan-{job.id[:8]}{whose}.{kind.ending}"
+        return _response(kind.write(plan, flights), kind.media_type, name)
     files = {
-        file_name(flight, kind.ending, numbered=plan.has_bases): kind.write(flight, choices)
-        for flight in flights
+        file_name(each.flight, kind.ending, numbered=plan.has_bases): kind.write(each) for each in flights
     }
     if uav is not None and len(files) == 1:
         ((name, text),) = files.items()
         return _response(text, kind.media_type, name)
-    of_uav = "" if uav is None else f"-{flights[0].route + 1:03d}"
+    of_uav = "" if uav is None else f"-{flights[0].flight.route + 1:03d}"
     return _response(zip_archive(files), _ZIP, f"plan-{job.id[:8]}{of_uav}-{format}.zip")
 
 
-def _flights(plan: FlownPlan, uav: str | None) -> list[Flight]:
-    """Return the flights of a UAV, or of all.
+def _flights(
+    plan: FlownPlan, uav: str | None, choices: FlightChoices, separation: Separation
+) -> list[PlannedFlight]:
+    """Return the flights of a UAV, or of all, as they are flown among all others.
 
     Raises
     ------
     UnknownUAV, NothingToFly
         If the plan does not have the UAV, or any flight.
     """
-    routes = [route for route in plan.routes if uav in (None, route.uav.id)]
-    if uav is not None and not routes:
+    if uav is not None and all(route.uav.id != uav for route in plan.routes):
         raise UnknownUAV(uav)
-    flights = [flight for route in routes for flight in route.flown]
+    planned = planned_flights(plan, choices, separation)
+    flights = [each for each in planned if uav in (None, each.flight.uav.id)]
     if not flights:
         raise NothingToFly(uav)
     return flights

@@ -3,7 +3,7 @@
 import { ApiError, json } from "./api.js";
 
 /** The type of the refusal of a plan; any other is of the problem, or of the service. */
-const ILLEGAL = "illegal-plan";
+const ILLEGAL = "/docs/errors#illegal-plan";
 
 /**
  * Evaluate a plan.

@@ -17,6 +17,9 @@ const DELIVERIES = [
 const FILES = [
   ["qgc-plan", "QGroundControl .plan"],
   ["qgc-wpl", "Waypoints, QGC WPL 110"],
+  ["briefing", "Briefing: times, altitudes, warnings"],
+  ["kml", "Map, KML"],
+  ["gpx", "Routes, GPX"],
 ];
 const DOCUMENTS = [
   ["geojson", "GeoJSON of the whole plan"],
@@ -55,7 +58,9 @@ function mount(root) {
   parts.form.append(
     row("UAV", parts.uav),
     row("Altitude, m", figure("altitude", "50", "1", "10000")),
-    row("Measured from", choice("altitude_reference", [["home", "the starting point"], ["terrain", "the ground below"]])),
+    row("Between UAVs of one place, m", figure("altitude_step", "10", "0", "500")),
+    row("Measured from", choice("altitude_reference", [["", "the start, or the ground below on long flights"], ["home", "the starting point"], ["terrain", "the ground below"]])),
+    row("Between launches, s", figure("launch_interval", "60", "0", "3600")),
     row("Delivery", choice("delivery", DELIVERIES)),
     row("It may descend, m (0: no limit)", figure("max_descent", "0", "0", "1000"), "payload-place"),
     row("Servo output", figure("servo_channel", "9", "1", "32", "1"), "servo"),

@@ -1,0 +1,52 @@
+"""What is read before the first take-off: all flights in their order, with altitudes, times and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from app.api.plan_formats.flown_plan import FlownPlan
+from app.api.plan_formats.launches import PlannedFlight
+from app.api.plan_formats.mission import AltitudeReference
+from app.api.plan_formats.printed_text import called, clock, position_text
+
+_MEASURED_FROM = {AltitudeReference.HOME: "its start", AltitudeReference.TERRAIN: "the ground below"}
+
+
+def briefing(plan: FlownPlan, flights: Sequence[PlannedFlight]) -> str:
+    """Write the flights of a ``wgs84`` plan as text, in the order in which they take off.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    flights
+        Those to write.
+    """
+    begun = sorted(flights, key=lambda each: each.flight.take_off_time or 0.0)
+    lines = [
+        f"Flights of plan {plan.job_id[:8]}, as they take off. Times: hours:minutes from the plan's begin.",
+        "",
+    ]
+    for number, each in enumerate(begun, 1):
+        lines += [*_flight(plan, number, each), ""]
+    return "\n".join(lines)
+
+
+def _flight(plan: FlownPlan, number: int, planned: PlannedFlight) -> Iterator[str]:
+    flight, choices = planned.flight, planned.choices
+    which = f", flight {flight.number}" if plan.has_bases else ""
+    yield f"{number}. {called(flight.uav)}{which}"
+    takes_off = flight.take_off_time
+    begins = "is in the air" if takes_off is None else f"takes off at {clock(takes_off)}"
+    yield f"   {begins}, {position_text(plan, *flight.place)}"
+    yield f"   {choices.altitude_m:g} m above {_MEASURED_FROM[choices.altitude_reference]}"
+    for at, stop in enumerate(flight.stops):
+        yield (
+            f"   {clock(flight.arrives(at))} {called(stop.target)}, {position_text(plan, *stop.path[-1])}, "
+            f"{stop.range_left:.1f} km of range left"
+        )
+    landing = flight.landing
+    where = "where it started" if landing.base is None else f"at base {called(landing.base)}"
+    if landing.time is not None:
+        yield f"   {clock(landing.time)} lands {where}, {landing.range_left:.1f} km of range left"
+    yield from (f"   ! {warning}" for warning in planned.warnings)

@@ -1,0 +1,1 @@
+"""The MCP server: the service as tools for assistants, through the client."""
