@@ -22,7 +22,7 @@ from app.learning.parameters import TransferQmixParameters
 from app.learning.qmix import metrics_of, qmix_config, require_memory, train
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.effort import effort
-from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.transfer import UniversalTransfer, fill_in
 from app.simulation.arrays import compile_problem

@@ -20,8 +20,8 @@ from app.jobs.model import BEST_KNOWN
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.parameters import QmixParameters
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.settings import Settings
 from policy_store.database import Database

@@ -12,8 +12,8 @@ from app.domain.plan import Plan
 from app.domain.records import problem_to_record
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.parameters import QmixParameters
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate

@@ -28,10 +28,10 @@ from app.learning.paper.architecture import QmixConfig
 from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import EpisodeRecord
 from app.learning.paper.networks import QmixNetwork
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network import architecture as universal
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.updates.learner import evaluate, joint_values, make_batch
 from app.simulation.arrays import compile_problem
 from app.solvers.greedy import greedy_plan

@@ -25,8 +25,8 @@ from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import Network, decode
 from app.learning.paper.architecture import QMIX_PAPER_1, QmixConfig
 from app.learning.paper.networks import QmixNetwork
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import QMIX_UNIVERSAL_1
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from app.solvers.protocol import SourcePolicy

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from app.domain.problem import Problem
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.simulation.generator import FAMILIES, generate
 
 SMALL = UniversalConfig(width=8, layers=2, qmix_hidden_dim=4)

@@ -11,8 +11,8 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
 from app.learning.checkpoints.checkpoint import decode, encode, verify
 from app.learning.parameters import QmixParameters
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig, expected_tensors
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.library.summary import SUMMARY_SPACE
 from app.simulation.generator import FAMILIES, generate

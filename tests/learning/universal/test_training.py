@@ -9,8 +9,8 @@ from numba import typeof
 from referee import replay
 
 from app.domain.records import problem_to_record
+from app.learning.universal.episodes.policy import UniversalPolicy, initial
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy, initial
 from app.learning.universal.training import trainer
 from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
 from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard

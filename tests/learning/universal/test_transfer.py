@@ -18,8 +18,8 @@ from app.learning.parameters import MAX_SAMPLES, QmixParameters, TransferQmixPar
 from app.learning.qmix import Qmix
 from app.learning.transfer import TransferQmix
 from app.learning.universal.episodes.effort import effort
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.rollout import play
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.transfer import fill_in
 from app.library.entries import new_policy
 from app.library.summary import task_summary

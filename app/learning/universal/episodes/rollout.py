@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from app.learning.compute.kernels import Float32s
-from app.learning.parameters import SERVICE_EPSILON
 from app.learning.universal.episodes.observation import (
     FORBIDDEN,
     VisitGains,
@@ -18,6 +16,7 @@ from app.learning.universal.episodes.observation import (
     new_gains,
     observe,
 )
+from app.learning.universal.episodes.played import Played
 from app.learning.universal.episodes.turn_order import reorder, restore_plans
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
@@ -28,26 +27,6 @@ from app.simulation.episodes import Episodes
 from app.simulation.simulator import act, close, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
-
-
-def exploration(episodes: int) -> Floats:
-    """Return the ``epsilon`` (B,) of episodes of which every other one explores."""
-    return np.where(np.arange(episodes) % 2, SERVICE_EPSILON, 0.0)
-
-
-class Played(NamedTuple):
-    """B episodes that were played.
-
-    Attributes
-    ----------
-    plans
-        (B, S, M) joint actions; rows after an episode's end send everybody home.
-    rewards
-        (B,)
-    """
-
-    plans: Integers
-    rewards: Floats
 
 
 def play(
@@ -98,7 +77,10 @@ def play(
     turn = np.empty(batch, np.int64)
     branch, branches = problem.copy(), len(bias)
     for s in range(steps):
+        gains.acted[:] = False
         for i in range(m):
+            if i:
+                gains.acted[:, i - 1] = True
             if stop():
                 _send_home(arrays, episodes, rewards)
                 return Played(plans, rewards)

@@ -11,9 +11,10 @@ import numpy as np
 from app.domain.errors import ProblemTooLarge
 from app.learning.compute.device import learning_device
 from app.learning.universal.episodes.effort import batch_of, episodes_of
-from app.learning.universal.episodes.rollout import exploration, play
+from app.learning.universal.episodes.played import exploration
+from app.learning.universal.episodes.policy import UniversalPolicy
+from app.learning.universal.episodes.rollout import play
 from app.learning.universal.episodes.turns import replay_turns
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.updates.learner import Learner, make_batch
 from app.learning.universal.updates.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.learning.universal.episodes.rollout import exploration, play
+from app.learning.universal.episodes.played import exploration
+from app.learning.universal.episodes.rollout import play
 from app.learning.universal.episodes.routes import fly_routes
 from app.learning.universal.network.agent import UniversalAgent
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays

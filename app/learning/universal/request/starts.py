@@ -8,9 +8,9 @@ from app.domain.problem import Problem
 from app.learning.checkpoints.source_policies import SourcePolicies
 from app.learning.compute.threads import one_thread
 from app.learning.universal.episodes.effort import effort
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.rollout import play_in_orders
 from app.learning.universal.episodes.turn_order import some_orders
-from app.learning.universal.network.policy import UniversalPolicy
 from app.simulation.arrays import Integers, ProblemArrays
 from app.solvers.protocol import SourcePolicy, StopCriterion
 from app.solvers.seeds import seed_sequence

@@ -19,11 +19,11 @@ from app.learning.checkpoints.source_policies import Source
 from app.learning.parameters import FINE_TUNING_LR, REPLANS_A_SAMPLE, TransferQmixParameters
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.effort import Effort, batch_of, effort
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.rollout import play, play_in_orders
 from app.learning.universal.episodes.temperature import Temperature
 from app.learning.universal.episodes.turn_order import some_orders
 from app.learning.universal.network.parallel import in_parallel
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import FineTuning, require_memory
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.recombination import Recombination

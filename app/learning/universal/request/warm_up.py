@@ -7,8 +7,8 @@ from app.learning.checkpoints.checkpoint import verify
 from app.learning.checkpoints.source_policies import Source
 from app.learning.compute.threads import one_thread
 from app.learning.parameters import TransferQmixParameters
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.transfer import UniversalTransfer
 from app.solvers.protocol import SourcePolicy
 from app.solvers.stop import never

@@ -26,9 +26,9 @@ from pydantic import Field
 from app.domain.errors import InvalidCheckpoint
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.cluster_training import connected, on_cluster
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.rollout import play
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.training.curriculum import Shard
 from app.learning.universal.training.demonstrations import (
     Series,

@@ -2,28 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import torch
 from safetensors.torch import load_file
 from torch import nn
 
+from app.learning.universal.episodes.played import Played
+from app.learning.universal.episodes.rollout import play
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import UniversalConfig
 from app.learning.universal.network.mixer import UniversalMixer
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.solvers.protocol import StopCriterion, no_spare_threads
+from app.solvers.stop import never
 
 _STATE_PREFIXES = {"networks.0.0.": "agent.", "networks.0.1.": "mixer."}
 """Names in a training's state, and in a checkpoint."""
 
 
 class UniversalPolicy(nn.Module):
-    """Both networks of ``qmix-universal-1``.
+    """Both networks of ``qmix-universal-1``; an
+    :class:`~app.learning.universal.episodes.played.AnySizePolicy`.
 
     Parameters
     ----------
     config
         Their sizes.
     """
+
+    takes_turns = True
+    knows_reloads = False
 
     def __init__(self, config: UniversalConfig) -> None:
         super().__init__()
@@ -39,6 +50,19 @@ class UniversalPolicy(nn.Module):
             policy = cls(config)
         policy.agent, policy.mixer = initial(config, seed)
         return policy
+
+    def play(
+        self,
+        arrays: ProblemArrays,
+        problem: Integers,
+        rng: np.random.Generator | None = None,
+        temperature: float = 1.0,
+        stop: StopCriterion = never,
+        spare: Callable[[], int] = no_spare_threads,
+        epsilon: Floats | None = None,
+    ) -> Played:
+        """Play episodes; see :func:`~app.learning.universal.episodes.rollout.play`."""
+        return play(self.agent, arrays, problem, rng, temperature, stop, spare, epsilon)
 
     @classmethod
     def of_training(cls, state: Path, config: UniversalConfig) -> UniversalPolicy:
