@@ -35,7 +35,7 @@ TOKEN_PAIRS = 6
 """As many pairs cost what one UAV or area costs."""
 
 PROBLEMS = 8
-"""Problems that share a batch, at least, unless two states of each are more than fit in."""
+"""As many problems share a batch, at least, unless two states of each are more than fit in."""
 
 DECISION_PAIRS = 14_000
 """Pairs in the whole episodes of an update with the TD loss, about."""
@@ -180,10 +180,10 @@ class Material:
 
     def __init__(self, shown: Sequence[Demonstration], device: torch.device) -> None:
         self._shown, self._device = shown, device
-        sizes = np.array([(each.problem.n_uavs, each.problem.n_targets) for each in shown])
+        sizes = np.array([(p.n_uavs, p.n_targets, 1 + p.n_bases) for p in (each.problem for each in shown)])
         self._sizes = np.log(sizes)
         self._every = np.arange(len(shown))
-        self._small = np.flatnonzero(sizes.prod(axis=1) < SMALL)
+        self._small = np.flatnonzero(sizes[:, :2].prod(axis=1) < SMALL)
 
     def of_update(self, schedule: Schedule, update: int) -> tuple[Batch, Decisions | None]:
         """Return what an update learns from: states, and every now and then whole episodes."""
