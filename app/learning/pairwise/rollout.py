@@ -30,7 +30,7 @@ from app.learning.pairwise.observation import (
     new_seen,
     observe,
 )
-from app.learning.universal.episodes.played import Played
+from app.learning.universal.episodes.played import Played, acting_on_an_answer
 from app.learning.universal.network.parallel import helpers, parallel_threads
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
@@ -40,8 +40,8 @@ from app.simulation.simulator import act, close, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
-_ANSWERS_A_STEP = 12
-"""Where more UAVs than these are out, several act on one answer, so that a step takes about as many."""
+# Where many UAVs are out, several act on one answer, so that a step takes about as many answers as with few.
+_acting = compiled(acting_on_an_answer)
 
 
 def play(
@@ -227,7 +227,7 @@ def _commit(
         out = 0
         for i in range(m):
             out += not episodes.ret[b, i]
-        left = max(1, out // _ANSWERS_A_STEP)
+        left = _acting(out)
         taken = np.zeros(n + 1 + gains.reloads.shape[2], np.bool_)
         for i in np.argsort(-sure[q]):
             if left == 0:

@@ -76,3 +76,17 @@ class AnySizePolicy(Protocol):
 def exploration(episodes: int) -> Floats:
     """Return the ``epsilon`` (B,) of episodes of which every other one explores."""
     return np.where(np.arange(episodes) % 2, SERVICE_EPSILON, 0.0)
+
+
+_ANSWERS_A_STEP = 12
+"""About as many answers has a step of many UAVs."""
+
+
+def acting_on_an_answer(uavs: int) -> int:
+    """Return how many of the UAVs that are out act on one answer of a policy that decides who acts first."""
+    return max(1, uavs // _ANSWERS_A_STEP)
+
+
+def answers_a_step(uavs: int) -> float:
+    """Return how many answers a step has in which so many UAVs are out."""
+    return uavs / acting_on_an_answer(uavs)

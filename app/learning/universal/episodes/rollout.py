@@ -17,7 +17,6 @@ from app.learning.universal.episodes.observation import (
     observe,
 )
 from app.learning.universal.episodes.played import Played
-from app.learning.universal.episodes.turn_order import reorder, restore_plans
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.network.inference import ask_together, attention_bias, compile_agent
@@ -124,41 +123,6 @@ def play(
         if episodes.done.all():
             break
     return Played(plans, rewards)
-
-
-def play_in_orders(
-    agent: UniversalAgent,
-    arrays: ProblemArrays,
-    orders: Integers,
-    repeats: int = 1,
-    rng: np.random.Generator | None = None,
-    temperature: float = 1.0,
-    stop: StopCriterion = never,
-    spare: Callable[[], int] = no_spare_threads,
-) -> Integers:
-    """Play one problem with its UAVs taking turns in several orders; return plans (Q * repeats, S, M).
-
-    Where two UAVs are at one target in the same step, what a plan earns, even whether it is allowed, can
-    differ from the episode that was played: the simulator lets UAVs act by their index. So replay the plans.
-
-    Parameters
-    ----------
-    agent, rng, temperature, stop, spare
-        As :func:`play` has them.
-    arrays
-        A stack of one problem.
-    orders
-        (Q, M), as :mod:`~app.learning.universal.episodes.turn_order` has them.
-    repeats
-        Episodes in each order.
-    """
-    count = len(orders)
-    several = ProblemArrays(
-        **{name: np.repeat(column, count, axis=0) for name, column in arrays._asdict().items()}
-    )
-    episodes = np.repeat(np.arange(count), repeats)
-    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop, spare)
-    return restore_plans(played.plans, orders[episodes])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
