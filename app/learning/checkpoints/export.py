@@ -15,7 +15,7 @@ import inspect
 import json
 import logging
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
@@ -30,7 +30,6 @@ from app.learning.pairwise.on_board import COLUMNS, PairwiseOnBoard
 from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.paper.agent_network import AgentNetwork
 from app.learning.paper.architecture import QmixConfig
-from app.learning.paper.networks import QmixNetwork
 from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.on_board import OWN_NAMES, PAIR_NAMES, RIVAL_NAMES, UniversalOnBoard
 
@@ -136,43 +135,26 @@ def to_onnx(checkpoint: bytes) -> bytes:
         If the packages for it are missing.
     """
     found = decode(checkpoint)
-    said = {key: found.metadata[key] for key in _KEPT_METADATA if key in found.metadata}
-    properties = {"sha256": hashlib.sha256(checkpoint).hexdigest(), "checkpoint": _json(said)}
-    return network_to_onnx(found.network, found.config, properties)
-
-
-def network_to_onnx(network: nn.Module, config: object, properties: Mapping[str, str]) -> bytes:
-    """Write the agent network of a policy as an ONNX model.
-
-    Parameters
-    ----------
-    network, config
-        Of any architecture the codec knows, and its sizes.
-    properties
-        What the model's metadata says, beside the columns of its inputs by name.
-
-    Raises
-    ------
-    ExtraNotInstalled
-        If the packages for it are missing.
-    """
     require_extra()
     onnx = import_module("onnx")
+    said = {key: found.metadata[key] for key in _KEPT_METADATA if key in found.metadata}
+    properties = {"sha256": hashlib.sha256(checkpoint).hexdigest(), "checkpoint": _json(said)}
     columns: dict[str, Sequence[str]] = {}
     module: PairwiseOnBoard | UniversalOnBoard | PaperOnBoard
-    if isinstance(network, PairwisePolicy):
-        module, example = PairwiseOnBoard(network.agent), PairwiseOnBoard.example()
+    if isinstance(found.network, PairwisePolicy):
+        module, example = PairwiseOnBoard(found.network.agent), PairwiseOnBoard.example()
         columns = {name: [each.name.lower() for each in kind] for name, kind in COLUMNS.items()}
-    elif isinstance(network, UniversalPolicy):
-        module, example = UniversalOnBoard(network.agent), UniversalOnBoard.example(network.config)
+    elif isinstance(found.network, UniversalPolicy):
+        module = UniversalOnBoard(found.network.agent)
+        example = UniversalOnBoard.example(found.network.config)
         columns = {"pair": PAIR_NAMES, "own": OWN_NAMES, "rivals": RIVAL_NAMES}
     else:
-        assert isinstance(network, QmixNetwork)
-        assert isinstance(config, QmixConfig)
-        module, example = PaperOnBoard(network.agent), PaperOnBoard.example(config)
+        assert isinstance(found.config, QmixConfig)
+        module, example = PaperOnBoard(found.network.agent), PaperOnBoard.example(found.config)
     model = _trace(module, example)
-    said = {"columns": _json(columns)} if columns else {}
-    onnx.helper.set_model_props(model, {**properties, **said})
+    if columns:
+        properties["columns"] = _json(columns)
+    onnx.helper.set_model_props(model, properties)
     onnx.checker.check_model(model, full_check=True)
     data: bytes = model.SerializeToString(deterministic=True)
     return data

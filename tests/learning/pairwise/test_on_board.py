@@ -1,13 +1,15 @@
 """The answer to a state as an ONNX model: ONNX Runtime plays the episodes that the service plays."""
 
+import hashlib
 import json
 
 import numpy as np
 import pytest
 import torch
 
-from app.learning.checkpoints.export import network_to_onnx
-from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.checkpoints.checkpoint import encode
+from app.learning.checkpoints.export import to_onnx
+from app.learning.pairwise.architecture import QMIX_UNIVERSAL_2, UNIVERSAL_FEATURES_2, PairwiseConfig
 from app.learning.pairwise.features import UavFeature
 from app.learning.pairwise.observation import (
     begin_step,
@@ -22,6 +24,7 @@ from app.learning.pairwise.observation import (
 from app.learning.pairwise.on_board import COLUMNS, PairwiseOnBoard
 from app.learning.pairwise.reference import PAGE, with_tables
 from app.learning.pairwise.rollout import play
+from app.learning.parameters import TransferQmixParameters
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.simulation.simulator import act, end_step, new_episodes
@@ -38,10 +41,24 @@ def policy(make_policy):
 
 
 @pytest.fixture(scope="module")
-def session(policy):
+def checkpoint(policy):
+    task = generate("uniform", 3, 5, 2, np.random.default_rng(1))
+    return encode(
+        policy,
+        config=policy.config,
+        task=task,
+        algorithm="transfer_qmix",
+        seed=1,
+        parameters=TransferQmixParameters(),
+        metrics={"reward": 0.0, "epochs": 0},
+    )
+
+
+@pytest.fixture(scope="module")
+def session(checkpoint):
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
-    model = network_to_onnx(policy, policy.config, {"sha256": "of a checkpoint"})
+    model = to_onnx(checkpoint)
     assert b"site-packages" not in model
     return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
@@ -143,7 +160,7 @@ def test_the_surest_that_has_not_acted_takes_its_most_likely_action_that_is_allo
         assert action[0] == logits[uav[0]].argmax()
 
 
-def test_the_model_says_what_its_columns_are(session):
+def test_the_model_says_what_it_is_and_what_its_columns_are(session, checkpoint):
     said = session.get_modelmeta().custom_metadata_map
     columns = json.loads(said["columns"])
     shapes = {each.name: each.shape for each in session.get_inputs()}
@@ -151,7 +168,9 @@ def test_the_model_says_what_its_columns_are(session):
         name: len(listed) for name, listed in columns.items()
     }
     assert columns["uavs"][UavFeature.ACTED] == "acted"
-    assert said["sha256"] == "of a checkpoint"
+    about = json.loads(said["checkpoint"])
+    assert (about["architecture"], about["features"]) == (QMIX_UNIVERSAL_2, UNIVERSAL_FEATURES_2)
+    assert said["sha256"] == hashlib.sha256(checkpoint).hexdigest()
     assert shapes["visits"][:2] == ["uavs", "areas"]
 
 
