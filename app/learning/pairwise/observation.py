@@ -558,7 +558,7 @@ def _observe_reloads(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b:
             row[ReloadFeature.REACHED_THEN] = reached / needy if needy > 0 else 0.0
             row[ReloadFeature.RANGE_GAINED] = clip(episodes.flown[b, i] / span, 0.0, _LONG)
             row[ReloadFeature.TIME_LEFT] = clip((arrays.uavs[p, i].until - clock) / time, -1.0, _LONG)
-            row[ReloadFeature.LANDS_NEAR] = clip(
+            row[ReloadFeature.FARTHER_THAN_HOME] = clip(
                 (length - leg_home(arrays, episodes, b, i)) / span, -1.0, _FAR
             )
 

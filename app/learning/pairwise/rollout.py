@@ -79,6 +79,7 @@ def play(
     episodes, gains = new_episodes(arrays, batch, problem), new_gains(arrays, batch)
     look(arrays, episodes, gains)
     plans, rewards = np.full((batch, steps, m), n, np.int64), np.zeros(batch)
+    _close_empty(arrays, episodes, rewards)
     compiled_agent, sharpness = compile_agent(agent), float(agent.sharpness.detach().exp())
     biases = place_bias(agent, nearness(arrays, gains.span))
     seen = new_seen(batch, arrays)
@@ -148,6 +149,14 @@ def _ask_together(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _close_empty(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> None:
+    """Let all fly home where nobody may do anything else from the beginning: that too can cost reward."""
+    for b in range(episodes.done.shape[0]):
+        if episodes.done[b]:
+            rewards[b] += close(arrays, episodes, b)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _begin_steps(
     arrays: ProblemArrays, episodes: Episodes, gains: Gains, joint: Integers, rewards: Floats
 ) -> None:
@@ -155,11 +164,11 @@ def _begin_steps(
         if episodes.done[b]:
             continue
         begin_step(episodes, gains, b)
-        rewards[b] += _send_idle(arrays, episodes, gains, b, joint[b])
+        rewards[b] += send_idle(arrays, episodes, gains, b, joint[b])
 
 
 @compiled
-def _send_idle(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, joint: Integers) -> float:
+def send_idle(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, joint: Integers) -> float:
     """Send home whoever may do nothing else, and return what that earns."""
     earned = 0.0
     for i in range(episodes.at.shape[1]):
@@ -231,7 +240,7 @@ def _commit(
             look_again(arrays, episodes, gains, b, i, a)
             taken[a] = True
             left -= 1
-        rewards[b] += _send_idle(arrays, episodes, gains, b, joint[b])
+        rewards[b] += send_idle(arrays, episodes, gains, b, joint[b])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

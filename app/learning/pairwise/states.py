@@ -21,6 +21,7 @@ from app.learning.pairwise.observation import (
     new_seen,
     observe,
 )
+from app.learning.pairwise.rollout import send_idle
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
@@ -159,6 +160,7 @@ def _some_states(
 ) -> int:
     """Fly a plan in episode 0, and branch off episode 1 for every state that is wanted; return how many."""
     m = plan.shape[1]
+    joint = np.empty(m, np.int64)
     look(arrays, episodes, gains)
     found = 0
     for s in range(plan.shape[0]):
@@ -171,8 +173,10 @@ def _some_states(
             begin_step(episodes, gains, 1)
             acts = np.zeros(m, np.bool_)
             count = 0
-            for i in orders[q]:
+            for i in range(m):
                 look_at(arrays, episodes, gains, 1, i)
+            send_idle(arrays, episodes, gains, 1, joint)
+            for i in orders[q]:
                 if not episodes.ret[1, i] and count < before[q]:
                     acts[i] = True
                     count += 1
@@ -181,6 +185,7 @@ def _some_states(
                 if acts[i] and _may(gains, 1, i, plan[s, i]):
                     act(arrays, episodes, 1, i, plan[s, i])
                     look_again(arrays, episodes, gains, 1, i, plan[s, i])
+            send_idle(arrays, episodes, gains, 1, joint)
             known = False
             for i in range(m):
                 free = not gains.acted[1, i] and _has_choice(gains, 1, i)
@@ -208,6 +213,7 @@ def _all_turns(
     uav: Integers,
     reward: Floats,
 ) -> int:
+    joint = np.empty(plan.shape[1], np.int64)
     look(arrays, episodes, gains)
     found = 0
     for s in range(plan.shape[0]):
@@ -215,6 +221,7 @@ def _all_turns(
             break
         begin_step(episodes, gains, 0)
         for i in range(plan.shape[1]):
+            reward[s] += send_idle(arrays, episodes, gains, 0, joint)
             if episodes.ret[0, i]:
                 continue
             if _has_choice(gains, 0, i):
