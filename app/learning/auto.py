@@ -12,8 +12,6 @@ from app.domain.problem import Problem
 from app.learning.universal.episodes.effort import roll_out_work
 from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.evaluation import rewards_of
-from app.simulation.simulator import new_episodes
-from app.simulation.stacks import without_reloads
 from app.simulation.visit import ALLOWED
 from app.solvers.local_search.annealing import Search, actions_of, new_search, set_routes
 from app.solvers.local_search.solver import how_long, search_on, watching
@@ -70,12 +68,10 @@ class Auto:
         moves, restarts = how_long(search, given.moves, given.restarts, stop)
         policy = policy_pays(arrays, stop.seconds_left()) if given.policy is None else given.policy
         source = None
-        # The policy knows no reloads.
-        played = without_reloads(arrays)
-        if policy and self._context.library_url and not new_episodes(played, 1).done[0] and not stop():
+        if policy and self._context.library_url and not stop():
             reward = float(search.best[0])
             report(Progress(0.0, 0, reward, Plan.of(actions_of(search), problem.n_targets)))
-            found = self._policy_starts(problem, played, seed, share_of_time(stop, _POLICY_SHARE))
+            found = self._policy_starts(problem, arrays, seed, share_of_time(stop, _POLICY_SHARE))
             if found is not None:
                 plans, source = found
                 _start_from_best(search, plans)

@@ -245,8 +245,8 @@ class TransferQmixParameters(_ModalParameters):
         default=None,
         ge=1,
         le=MAX_ORDERS,
-        description="Orders of the UAVs in which policies are rolled out greedily; 1 is one policy, once; "
-        "null: up to 6, by size",
+        description="Roll-outs that policies are tried with: one is greedy, the others are sampled at a low "
+        "temperature; 1 is one policy, once; null: up to 6, by size",
     )
     samples: Annotated[int | None, _SERVICE] = Field(
         default=None,

@@ -11,8 +11,9 @@ from typing import cast
 
 import numpy as np
 
+from app.domain.errors import InvalidParameters, Violation
 from app.domain.problem import Problem
-from app.learning.checkpoints.checkpoint import encode
+from app.learning.checkpoints.checkpoint import ANY_SIZE, encode
 from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.checkpoints.source_policies import Source, SourcePolicies
 from app.learning.compute.threads import one_thread
@@ -22,7 +23,7 @@ from app.learning.parameters import TransferQmixParameters
 from app.learning.qmix import metrics_of, qmix_config, require_memory, train
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.effort import effort
-from app.learning.universal.network.policy import UniversalPolicy
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.transfer import UniversalTransfer, fill_in
 from app.simulation.arrays import compile_problem
@@ -77,7 +78,8 @@ class TransferQmix:
                 sources = policies.shortlist(problem)
             else:
                 sources = [policies.asked_for(parameters.source, problem, config=config, any_size=True)]
-            if isinstance(sources[0].network, UniversalPolicy):
+                _require_trainable(sources[0], parameters)
+            if isinstance(sources[0].network, ANY_SIZE):
                 transfer = UniversalTransfer(problem, parameters, seed, stop, report, self._other_threads)
                 return transfer.run(sources)
             return _fine_tune_and_polish(problem, sources[0], parameters, seed, stop, report)
@@ -85,6 +87,22 @@ class TransferQmix:
     def _other_threads(self) -> int:
         """How many threads may work beside this one now."""
         return self._context.threads - 1 + self._context.spare_threads()
+
+
+def _require_trainable(source: Source, parameters: TransferQmixParameters) -> None:
+    """Refuse fine-tuning that is asked for of a policy that is only played.
+
+    Raises
+    ------
+    InvalidParameters
+        If it is.
+    """
+    if parameters.n_epochs and isinstance(source.network, UniversalPolicy):
+        detail = (
+            f"n_epochs is {parameters.n_epochs}, and policy {source.policy.id!r} is of an architecture "
+            "that is played and not trained any more; ask for 0, or for another source"
+        )
+        raise InvalidParameters(detail, [Violation("/parameters/n_epochs", detail)])
 
 
 def _fine_tune(

@@ -19,9 +19,9 @@ from app.domain.records import problem_from_record, problem_to_record
 from app.jobs.model import BEST_KNOWN
 from app.jobs.work_context import CANCEL, WorkContext, new_control
 from app.learning.checkpoints.checkpoint import encode
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import QmixParameters
-from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.settings import Settings
 from policy_store.database import Database
@@ -162,10 +162,10 @@ def test_training_is_registered_by_its_checkpoint():
 @pytest.fixture
 def library_url(tmp_path):
     """A library with a policy for every size."""
-    config = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+    config = PairwiseConfig(width=8, layers=1, qmix_hidden_dim=4)
     task = problem_from_record(record())
     checkpoint = encode(
-        UniversalPolicy.of_seed(config, 1),
+        PairwisePolicy.of_seed(config, 1),
         config=config,
         task=task,
         algorithm="qmix",

@@ -18,7 +18,7 @@ from app.learning.universal.episodes.observation import (
     new_gains,
     observe,
 )
-from app.learning.universal.episodes.rollout import Played
+from app.learning.universal.episodes.played import Played
 from app.learning.universal.episodes.turns import Turns
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.simulation.simulator import act, end_step, new_episodes

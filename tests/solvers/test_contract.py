@@ -11,9 +11,9 @@ from stopping import at_once
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
 from app.learning.checkpoints.checkpoint import encode
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import QmixParameters
-from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
@@ -91,9 +91,9 @@ def context(tmp_path_factory):
 
 def for_every_size(task):
     """A checkpoint of random weights."""
-    config = UniversalConfig(width=8, layers=1, qmix_hidden_dim=4)
+    config = PairwiseConfig(width=8, layers=1, qmix_hidden_dim=4)
     return encode(
-        UniversalPolicy.of_seed(config, 1),
+        PairwisePolicy.of_seed(config, 1),
         config=config,
         task=task,
         algorithm="qmix",

@@ -23,17 +23,22 @@ import app
 from app.domain.errors import InvalidCheckpoint, InvalidProblem
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
+from app.learning.pairwise import architecture as pairwise
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.learner import joint_values, make_decisions
+from app.learning.pairwise.policy import PairwisePolicy
+from app.learning.pairwise.states import all_turns
 from app.learning.paper import architecture as paper
 from app.learning.paper.architecture import QmixConfig
 from app.learning.paper.environment import SwarmEnvironment
 from app.learning.paper.episode import EpisodeRecord
 from app.learning.paper.networks import QmixNetwork
+from app.learning.universal.episodes.observation import nearness, scales
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network import architecture as universal
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
-from app.learning.universal.updates.learner import evaluate, joint_values, make_batch
-from app.simulation.arrays import compile_problem
+from app.simulation.arrays import Integers, compile_problem
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import Parameters
 from policy_store.checkpoint import read_container, require_finite, require_tensors
@@ -50,8 +55,11 @@ _CHECKED_UAVS, _CHECKED_TARGETS = 16, 32
 
 _log = logging.getLogger(__name__)
 
-Config = QmixConfig | UniversalConfig
-Network = QmixNetwork | UniversalPolicy
+Config = QmixConfig | UniversalConfig | PairwiseConfig
+AnySizeNetwork = UniversalPolicy | PairwisePolicy
+Network = QmixNetwork | AnySizeNetwork
+ANY_SIZE = (UniversalPolicy, PairwisePolicy)
+"""Networks for problems of every size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,14 +270,10 @@ def _paper_values(network: QmixNetwork, config: QmixConfig, problem: Problem) ->
         return values, network.mix(values.amax(dim=-1), states)
 
 
-@torch.inference_mode()
-def _universal_values(policy: UniversalPolicy, _: UniversalConfig, problem: Problem) -> Sequence[Tensor]:
-    """Q values of the turns of the greedy rule's plan, and Q_tot of its steps.
-
-    A part of the task will do, since every size fits.
-    """
+def _checked_part(problem: Problem) -> Problem:
+    """Leave a part of a task that is quickly tried; every size fits a policy for every size."""
     # Without what refers to the rest.
-    part = replace(
+    return replace(
         problem,
         uavs=tuple(
             replace(uav, committed=(), excluded=(), bases=None) for uav in problem.uavs[:_CHECKED_UAVS]
@@ -279,15 +283,42 @@ def _universal_values(policy: UniversalPolicy, _: UniversalConfig, problem: Prob
         start_plan=None,
         objective=replace(problem.objective, change_weight=0.0),
     )
-    arrays = compile_problem(part)
-    plans = np.full((1, part.max_steps, part.n_uavs), part.n_targets, np.int64)
+
+
+def _greedy_actions(part: Problem) -> Integers:
+    """Return the greedy rule's plan, (S, M)."""
+    plan = np.full((part.max_steps, part.n_uavs), part.n_targets, np.int64)
     rows = greedy_plan(part).as_array()
-    plans[0, : len(rows)] = rows
-    turns = replay_turns(arrays, np.zeros(1, np.int64), plans)
-    batch = make_batch(arrays, turns, torch.device("cpu"))
-    found = evaluate(policy.agent, batch)
-    chosen = found.values.gather(1, batch.action[:, None])[:, 0]
-    return found.values, joint_values(batch, chosen, found.hidden, policy.mixer)[0]
+    plan[: len(rows)] = rows
+    return plan
+
+
+@torch.inference_mode()
+def _universal_values(policy: UniversalPolicy, _: UniversalConfig, problem: Problem) -> Sequence[Tensor]:
+    """Q values of the turns of the greedy rule's plan, each as if it was the UAV's first, and a joint one."""
+    part = _checked_part(problem)
+    arrays = compile_problem(part)
+    turns = replay_turns(arrays, np.zeros(1, np.int64), _greedy_actions(part)[None])
+    pair, own, rivals = (torch.from_numpy(each) for each in (turns.pair, turns.own, turns.rivals))
+    distance = torch.from_numpy(nearness(arrays, scales(arrays)[0]))
+    agent = policy.agent
+    tokens = agent.encode(pair, own, rivals, agent.bias(distance).expand(len(pair), -1, -1, -1))
+    hidden = agent.remember(tokens, tokens.new_zeros(len(tokens), tokens.shape[-1]))
+    values = agent.values(tokens, hidden)
+    present = torch.ones(1, len(values), dtype=torch.bool)
+    return values, policy.mixer(values.amax(dim=1)[None], hidden[None], present)
+
+
+@torch.inference_mode()
+def _pairwise_values(policy: PairwisePolicy, _: PairwiseConfig, problem: Problem) -> Sequence[Tensor]:
+    """Q values of the decisions of the greedy rule's plan, and Q_tot of its steps."""
+    part = _checked_part(problem)
+    turns = all_turns(compile_problem(part), _greedy_actions(part))
+    decisions = make_decisions([turns], torch.device("cpu"))
+    values, hidden = policy.agent(decisions.batch.sight)
+    acting = (torch.arange(len(decisions.uav)), decisions.uav)
+    chosen = values[acting].gather(1, decisions.batch.action[acting][:, None])[:, 0]
+    return values, joint_values(decisions, chosen, hidden[acting], policy.mixer)[0]
 
 
 ARCHITECTURES: Mapping[str, Architecture] = {
@@ -300,6 +331,13 @@ ARCHITECTURES: Mapping[str, Architecture] = {
         universal.expected_tensors,
         UniversalPolicy,
         _universal_values,
+    ),
+    pairwise.QMIX_UNIVERSAL_2: Architecture(
+        pairwise.UNIVERSAL_FEATURES_2,
+        PairwiseConfig,
+        pairwise.expected_tensors,
+        PairwisePolicy,
+        _pairwise_values,
     ),
 }
 """The architectures by name."""

@@ -1,9 +1,9 @@
 """Agent networks as ONNX files, for computers on board that have neither torch nor this service.
 
-What is exported is one agent's turn: what the UAV sees and remembers goes in, the values of its actions and
-the best one that is allowed come out. The mixing network stays behind, since it is monotonic: the action that
-is best for the agent's own value is best for the swarm's. What the computer on board has to feed is written
-down in ``ON_BOARD.md``.
+What is exported is an answer to what is seen: of ``qmix-universal-2`` for all UAVs at once, with the one that
+acts first, otherwise a UAV's turn with what it remembers. The mixing network stays behind, since it is
+monotonic: the action that is best for the agent's own value is best for the swarm's. What the computer on
+board has to feed is written down in ``ON_BOARD.md``.
 
 The packages ``onnx`` and ``onnxscript`` are an extra of the installation and loaded only here.
 """
@@ -15,7 +15,7 @@ import inspect
 import json
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
@@ -26,10 +26,11 @@ from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from app.domain.errors import AllocatorError
 from app.learning.checkpoints.checkpoint import decode
+from app.learning.pairwise.on_board import COLUMNS, PairwiseOnBoard
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.paper.agent_network import AgentNetwork
 from app.learning.paper.architecture import QmixConfig
-from app.learning.paper.networks import QmixNetwork
-from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.on_board import OWN_NAMES, PAIR_NAMES, RIVAL_NAMES, UniversalOnBoard
 
 OPSET = 20
@@ -138,16 +139,21 @@ def to_onnx(checkpoint: bytes) -> bytes:
     onnx = import_module("onnx")
     said = {key: found.metadata[key] for key in _KEPT_METADATA if key in found.metadata}
     properties = {"sha256": hashlib.sha256(checkpoint).hexdigest(), "checkpoint": _json(said)}
-    module: UniversalOnBoard | PaperOnBoard
-    if isinstance(found.config, UniversalConfig):
-        module = UniversalOnBoard(found.network.agent)  # type: ignore[arg-type]  # a UniversalPolicy's
-        example = UniversalOnBoard.example(found.config)
+    columns: dict[str, Sequence[str]] = {}
+    module: PairwiseOnBoard | UniversalOnBoard | PaperOnBoard
+    if isinstance(found.network, PairwisePolicy):
+        module, example = PairwiseOnBoard(found.network.agent), PairwiseOnBoard.example()
+        columns = {name: [each.name.lower() for each in kind] for name, kind in COLUMNS.items()}
+    elif isinstance(found.network, UniversalPolicy):
+        module = UniversalOnBoard(found.network.agent)
+        example = UniversalOnBoard.example(found.network.config)
         columns = {"pair": PAIR_NAMES, "own": OWN_NAMES, "rivals": RIVAL_NAMES}
-        properties["columns"] = _json(columns)
     else:
-        assert isinstance(found.network, QmixNetwork)
+        assert isinstance(found.config, QmixConfig)
         module, example = PaperOnBoard(found.network.agent), PaperOnBoard.example(found.config)
     model = _trace(module, example)
+    if columns:
+        properties["columns"] = _json(columns)
     onnx.helper.set_model_props(model, properties)
     onnx.checker.check_model(model, full_check=True)
     data: bytes = model.SerializeToString(deterministic=True)
@@ -172,7 +178,7 @@ def require_extra() -> None:
             ) from None
 
 
-def _trace(module: UniversalOnBoard | PaperOnBoard, example: tuple[Tensor, ...]) -> Any:
+def _trace(module: PairwiseOnBoard | UniversalOnBoard | PaperOnBoard, example: tuple[Tensor, ...]) -> Any:
     """Trace a module and return the model, without what the tracer tells about this machine."""
     # Of the kernels for attention only the plain one is made of operators that ONNX has.
     with _quiet(), sdpa_kernel(SDPBackend.MATH), torch.random.fork_rng(devices=[]):

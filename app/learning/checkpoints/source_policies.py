@@ -22,11 +22,9 @@ from app.domain.errors import (
     Violation,
 )
 from app.domain.problem import Problem
-from app.learning.checkpoints.checkpoint import Network, decode
+from app.learning.checkpoints.checkpoint import ANY_SIZE, Network, decode
 from app.learning.paper.architecture import QMIX_PAPER_1, QmixConfig
 from app.learning.paper.networks import QmixNetwork
-from app.learning.universal.network.architecture import QMIX_UNIVERSAL_1
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from app.solvers.protocol import SourcePolicy
@@ -80,9 +78,9 @@ class SourcePolicies:
         library = self._required(problem)
         space, description = description_space(problem), task_description(problem)
         unusable = 0
-        for neighbour in _nearest_first(library, space, description, QMIX_PAPER_1, 1):
+        for neighbour in _nearest_first(library, space, description, 1, architecture=QMIX_PAPER_1):
             if neighbour.policy.metadata.get("config") == config.as_record():
-                if found := _usable(library, neighbour, QmixNetwork):
+                if found := _usable(library, neighbour, (QmixNetwork,)):
                     return found[0]
                 unusable += 1
         sizes = library.sizes(QMIX_PAPER_1)
@@ -106,20 +104,19 @@ class SourcePolicies:
         library = self._required(problem)
         found: list[Source] = []
         seen: set[str] = set()
-        near = _nearest_first(
-            library, SUMMARY_SPACE, task_summary(problem), QMIX_UNIVERSAL_1, _LOOKED_THROUGH
-        )
+        summary = task_summary(problem)
+        near = _nearest_first(library, SUMMARY_SPACE, summary, _LOOKED_THROUGH, without=QMIX_PAPER_1)
         for place, neighbour in enumerate(near):
             if place >= _LOOKED_THROUGH and found:
                 break
             sha256 = neighbour.policy.checkpoint_sha256
             if sha256 not in seen:
                 seen.add(sha256)
-                found += _usable(library, neighbour, UniversalPolicy)
+                found += _usable(library, neighbour, ANY_SIZE)
             if len(found) == SHORTLIST:
                 break
         if not found:
-            reason = f"the library has no policy of architecture {QMIX_UNIVERSAL_1}, which fits every size"
+            reason = "the library has no policy for every size"
             if seen:
                 reason += f", that can be used; it has {len(seen)} that cannot"
             raise _no_source(problem, reason, library.sizes())
@@ -152,13 +149,13 @@ class SourcePolicies:
             policy, vectors = library.get(policy_id), library.vectors(policy_id)
         except PolicyNotFound:
             raise _bad_source(f"there is no policy {policy_id!r} in the library") from None
-        if policy.architecture == QMIX_UNIVERSAL_1 and SUMMARY_SPACE in vectors:
+        if policy.architecture != QMIX_PAPER_1 and SUMMARY_SPACE in vectors:
             if not any_size:
                 raise _bad_source(
                     f"policy {policy_id!r} is for every size; paper mode copies one for one size"
                 )
             distance = _distance(vectors[SUMMARY_SPACE], task_summary(problem))
-            return _named(library, policy, distance, UniversalPolicy)
+            return _named(library, policy, distance, ANY_SIZE)
         if policy.architecture == unusable_architecture(problem):
             raise _bad_source(
                 f"policy {policy_id!r} ({policy.architecture}) does not observe all that the problem uses; "
@@ -172,7 +169,7 @@ class SourcePolicies:
                 f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "
                 f"{_size(problem)} with {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
             )
-        return _named(library, policy, _distance(vectors[space], task_description(problem)), QmixNetwork)
+        return _named(library, policy, _distance(vectors[space], task_description(problem)), (QmixNetwork,))
 
     def _required(self, problem: Problem) -> PolicyLibrary:
         if self._library is None:
@@ -186,34 +183,42 @@ def preload(library_url: str, problem: Problem) -> None:
     As many as a process keeps, with the tasks nearest to a problem; what cannot be used is passed over.
     """
     library = _open(library_url)
-    for neighbour in library.nearest(SUMMARY_SPACE, task_summary(problem), _KEPT, QMIX_UNIVERSAL_1):
-        _usable(library, neighbour, UniversalPolicy)
+    for neighbour in library.nearest(SUMMARY_SPACE, task_summary(problem), _KEPT, without=QMIX_PAPER_1):
+        _usable(library, neighbour, ANY_SIZE)
 
 
 def _nearest_first(
-    library: PolicyLibrary, space: str, description: np.ndarray, architecture: str, at_first: int
+    library: PolicyLibrary,
+    space: str,
+    description: np.ndarray,
+    at_first: int,
+    *,
+    architecture: str | None = None,
+    without: str | None = None,
 ) -> Iterator[Neighbour]:
-    """Go through the policies of an architecture, nearest first; most callers need few."""
+    """Go through the policies of an architecture, or without one, nearest first; most callers need few."""
     asked, given = at_first, 0
     while True:
-        near = library.nearest(space, description, asked, architecture)
+        near = library.nearest(space, description, asked, architecture, without=without)
         yield from near[given:]
         if len(near) < asked:
             return
         given, asked = asked, 8 * asked
 
 
-def _usable(library: PolicyLibrary, neighbour: Neighbour, kind: type[Network]) -> list[Source]:
+def _usable(library: PolicyLibrary, neighbour: Neighbour, kinds: tuple[type[Network], ...]) -> list[Source]:
     """Return a policy with its networks; nothing where it cannot be used."""
     try:
-        return [_source(library, neighbour.policy, neighbour.distance, kind)]
+        return [_source(library, neighbour.policy, neighbour.distance, kinds)]
     except (AllocatorError, PolicyStoreError) as error:
         told = {"policy_id": neighbour.policy.id, "reason": str(error)}
         _log.warning("a policy of the library cannot be used", extra=told)
         return []
 
 
-def _named(library: PolicyLibrary, policy: Policy, distance: float, kind: type[Network]) -> Source:
+def _named(
+    library: PolicyLibrary, policy: Policy, distance: float, kinds: tuple[type[Network], ...]
+) -> Source:
     """Return a policy that a request names.
 
     Raises
@@ -222,12 +227,14 @@ def _named(library: PolicyLibrary, policy: Policy, distance: float, kind: type[N
         If it cannot be used.
     """
     try:
-        return _source(library, policy, distance, kind)
+        return _source(library, policy, distance, kinds)
     except (AllocatorError, PolicyStoreError) as error:
         raise _bad_source(f"policy {policy.id!r} cannot be used: {error}") from error
 
 
-def _source(library: PolicyLibrary, policy: Policy, distance: float, kind: type[Network]) -> Source:
+def _source(
+    library: PolicyLibrary, policy: Policy, distance: float, kinds: tuple[type[Network], ...]
+) -> Source:
     """Return a policy with its networks.
 
     Raises
@@ -245,7 +252,7 @@ def _source(library: PolicyLibrary, policy: Policy, distance: float, kind: type[
         if len(_decoded) > _KEPT:
             _decoded.popitem(last=False)
     _decoded.move_to_end(sha256)
-    if not isinstance(network, kind):
+    if not isinstance(network, kinds):
         raise InvalidCheckpoint(f"its networks are not those of architecture {policy.architecture}")
     return Source(SourcePolicy(policy.id, policy.name, distance), network)
 

@@ -10,9 +10,9 @@ from safetensors.torch import load, save
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
 from app.learning.checkpoints.checkpoint import decode, encode, verify
+from app.learning.pairwise.architecture import PairwiseConfig, expected_tensors
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import QmixParameters
-from app.learning.universal.network.architecture import UniversalConfig, expected_tensors
-from app.learning.universal.network.policy import UniversalPolicy
 from app.library.entries import new_policy
 from app.library.summary import SUMMARY_SPACE
 from app.simulation.generator import FAMILIES, generate
@@ -55,8 +55,8 @@ def test_what_is_read_is_what_was_written(data, policy, task):
     assert stored.keys() == original.keys()
     assert all(torch.equal(stored[name], original[name]) for name in original)
     assert problem_from_record(checkpoint.metadata["task"]) == task
-    assert checkpoint.metadata["architecture"] == "qmix-universal-1"
-    assert checkpoint.metadata["features"] == "universal-1"
+    assert checkpoint.metadata["architecture"] == "qmix-universal-2"
+    assert checkpoint.metadata["features"] == "universal-2"
     assert (checkpoint.metadata["name"], checkpoint.metadata["families"]) == (
         "every size",
         ["uniform", "scarce"],
@@ -65,14 +65,14 @@ def test_what_is_read_is_what_was_written(data, policy, task):
 
 def test_library_takes_it_in(data, task):
     policy = new_policy("a name", task, data)
-    assert policy.architecture == "qmix-universal-1"
+    assert policy.architecture == "qmix-universal-2"
     assert SUMMARY_SPACE in policy.vectors
     assert policy.metadata["families"] == ["uniform", "scarce"]
 
 
-@pytest.mark.parametrize("config", [UniversalConfig(), UniversalConfig(12, 3, 5), UniversalConfig(4, 1, 1)])
+@pytest.mark.parametrize("config", [PairwiseConfig(), PairwiseConfig(12, 3, 5), PairwiseConfig(4, 1, 1)])
 def test_every_expected_tensor_is_one_of_the_networks(config):
-    tensors = UniversalPolicy(config).state_dict()
+    tensors = PairwisePolicy(config).state_dict()
     assert {name: (tuple(t.shape), "F32") for name, t in tensors.items()} == expected_tensors(config)
 
 
@@ -86,7 +86,7 @@ def test_it_fits_a_task_of_any_size(data, family, size):
     ("fields", "reason"),
     [
         ({"features": "paper-1"}, "features is 'paper-1'"),
-        ({"architecture": "qmix-paper-1"}, "features is 'universal-1'"),
+        ({"architecture": "qmix-paper-1"}, "features is 'universal-2'"),
         ({"config": {"width": 8, "layers": 2}}, "exactly the fields"),
         ({"config": {"width": 6, "layers": 2, "qmix_hidden_dim": 4}}, "width is 6, not a multiple of 4"),
         ({"config": {"width": 8, "layers": 10**6, "qmix_hidden_dim": 4}}, "layers is 1000000"),
@@ -116,10 +116,10 @@ def huge(tensor):
     [
         (lambda tensors: tensors.pop("agent.sharpness"), "'agent.sharpness' is missing"),
         (lambda tensors: tensors.update(extra=torch.zeros(1)), "'extra' is not part"),
-        (change("agent.home", lambda t: t[1:]), "'agent.home' is F32"),
+        (change("agent.uav_in.bias", lambda t: t[1:]), "'agent.uav_in.bias' is F32"),
         (change("mixer.out_bias.2.weight", lambda t: t.double()), "F64"),
         (change("agent.score.bias", lambda t: t * torch.nan), "not finite"),
-        (change("agent.pair_in.weight", huge), "values of the task that are not finite"),
+        (change("agent.visit_in.weight", huge), "values of the task that are not finite"),
         (change("mixer.agent_weight.weight", huge), "values of the task that are not finite"),
     ],
 )

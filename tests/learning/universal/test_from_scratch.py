@@ -12,9 +12,9 @@ from stopping import After
 
 from app.domain.records import problem_to_record
 from app.learning.checkpoints.checkpoint import decode, verify
+from app.learning.pairwise.rollout import play
 from app.learning.parameters import QmixParameters
 from app.learning.qmix import Qmix
-from app.learning.universal.episodes.rollout import play
 from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
@@ -77,7 +77,7 @@ def test_epochs_are_episodes():
 def test_what_it_learned_plays_problems_of_other_sizes():
     solution = solve(generate("uniform", 4, 7, 3, np.random.default_rng(42)), n_epochs=20)
     checkpoint = decode(solution.checkpoint)
-    assert checkpoint.metadata["architecture"] == "qmix-universal-1"
+    assert checkpoint.metadata["architecture"] == "qmix-universal-2"
     assert checkpoint.metadata["algorithm"] == "qmix"
     verify(solution.checkpoint, generate("scarce", 9, 4, 5, np.random.default_rng(43)))
 
@@ -106,7 +106,7 @@ def test_stopped_at_any_time_it_returns_a_plan_and_a_checkpoint():
 
 def test_the_width_that_was_used_comes_back():
     problem = generate("uniform", 2, 3, 2, np.random.default_rng(46))
-    for asked, used in ((64, 64), (10, 12), (1024, 512)):
+    for asked, used in ((64, 64), (10, 12), (1024, 448)):
         solution = solve(problem, n_epochs=0, drqn_hidden_dim=asked)
         assert solution.parameters.drqn_hidden_dim == used
         assert decode(solution.checkpoint).config.width == used

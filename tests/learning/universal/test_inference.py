@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import (
     OWN_FEATURES,
     PAIR_FEATURES,
@@ -11,7 +12,6 @@ from app.learning.universal.network.architecture import (
     UniversalConfig,
 )
 from app.learning.universal.network.inference import ask, ask_together, attention_bias, compile_agent
-from app.learning.universal.network.policy import UniversalPolicy
 
 
 @pytest.mark.parametrize(

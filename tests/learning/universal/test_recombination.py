@@ -6,8 +6,8 @@ from referee import replay
 from stopping import at_once
 
 from app.domain.records import problem_to_record
+from app.learning.pairwise.rollout import play
 from app.learning.universal.episodes.best_plan import BestPlan
-from app.learning.universal.episodes.rollout import play
 from app.learning.universal.request import recombination
 from app.learning.universal.request.recombination import Recombination
 from app.simulation.arrays import compile_problem

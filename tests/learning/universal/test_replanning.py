@@ -8,7 +8,6 @@ from referee import replay
 from stopping import at_once
 
 from app.domain.records import problem_to_record
-from app.learning.universal.episodes.rollout import play
 from app.learning.universal.request.replanning import groups_of, replan, residual_of, round_of
 from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import rewards_of
@@ -46,7 +45,7 @@ def test_groups_are_of_two_to_six_uavs_that_may_fly():
 def test_nobody_is_planned_anew_where_fewer_than_two_may_fly(policy, flying):
     problem = generate("uniform", 4, 6, 2, np.random.default_rng(72))
     arrays = compile_problem(problem)._replace(ret=np.arange(4)[None] >= flying)
-    plans = replan(policy.agent, arrays, np.full((problem.max_steps, 4), 6), 8, np.random.default_rng(1))
+    plans = replan(policy, arrays, np.full((problem.max_steps, 4), 6), 8, np.random.default_rng(1))
     assert plans.shape == (0, problem.max_steps, 4)
 
 
@@ -88,13 +87,13 @@ def test_what_is_left_is_what_the_others_do_not_fly(family):
 
 def test_a_groups_episode_earns_what_it_adds_to_the_whole_plan(policy):
     compared = 0
-    for number in range(40):
+    for number in range(100):
         problem = generate("uniform", 7, 10, 2, np.random.default_rng([75, number]))
         arrays = compile_problem(problem)
         plan, _ = whole(problem)
         groups = groups_of(arrays, plan, 4, np.random.default_rng(number))
         left, uavs, targets = residual_of(arrays, plan, groups, np.random.default_rng(number))
-        played = play(policy.agent, left, np.arange(4), np.random.default_rng(number))
+        played = policy.play(left, np.arange(4), np.random.default_rng(number))
         for g, group in enumerate(groups):
             held = plan.copy()
             held[:, group] = 10
@@ -118,7 +117,7 @@ def test_plans_are_allowed_and_the_last_is_never_worse(policy, family):
     problem = generate(family, 6, 9, 3, np.random.default_rng([76, *family.encode()]))
     arrays, record = compile_problem(problem), problem_to_record(problem)
     plan, reward = whole(problem)
-    plans = replan(policy.agent, arrays, plan, 29, np.random.default_rng(1))
+    plans = replan(policy, arrays, plan, 29, np.random.default_rng(1))
     assert plans.shape == (30, problem.max_steps, 6)
     replayed = rewards_of(arrays, plans)
     assert (replayed.rule == 0).all()
@@ -131,9 +130,9 @@ def test_a_plan_gets_better_group_by_group(policy):
     for number in range(6):
         problem = generate("uniform", 10, 16, 2, np.random.default_rng([77, number]))
         arrays = compile_problem(problem)
-        plan = play(policy.agent, arrays, np.zeros(1, np.int64), np.random.default_rng(number)).plans[0]
+        plan = policy.play(arrays, np.zeros(1, np.int64), np.random.default_rng(number)).plans[0]
         reward = rewards_of(arrays, plan[None]).reward[0]
-        rewards = rewards_of(arrays, replan(policy.agent, arrays, plan, 192, np.random.default_rng(1))).reward
+        rewards = rewards_of(arrays, replan(policy, arrays, plan, 192, np.random.default_rng(1))).reward
         gained.append((rewards[:-1].max() - reward, rewards[-1] - reward))
     single, together = np.mean(gained, axis=0)
     assert together > 1.2 * single > 0.0
@@ -156,9 +155,9 @@ def test_same_numbers_same_plans_on_any_number_of_cores(policy):
     problem = generate("uniform", 9, 24, 2, np.random.default_rng(79))
     arrays = compile_problem(problem)
     plan, _ = whole(problem)
-    alone = replan(policy.agent, arrays, plan, 64, np.random.default_rng(1))
-    together = replan(policy.agent, arrays, plan, 64, np.random.default_rng(1), spare=lambda: 2)
-    other = replan(policy.agent, arrays, plan, 64, np.random.default_rng(2))
+    alone = replan(policy, arrays, plan, 64, np.random.default_rng(1))
+    together = replan(policy, arrays, plan, 64, np.random.default_rng(1), spare=lambda: 2)
+    other = replan(policy, arrays, plan, 64, np.random.default_rng(2))
     assert np.array_equal(alone, together)
     assert not np.array_equal(alone, other)
 
@@ -167,7 +166,7 @@ def test_once_time_is_up_the_others_fly_on(policy):
     problem = generate("uniform", 6, 9, 2, np.random.default_rng(80))
     arrays = compile_problem(problem)
     plan, reward = whole(problem)
-    plans = replan(policy.agent, arrays, plan, 8, np.random.default_rng(1), stop=at_once())
+    plans = replan(policy, arrays, plan, 8, np.random.default_rng(1), stop=at_once())
     assert rewards_of(arrays, plans).reward[-1] == pytest.approx(reward)
 
 

@@ -13,10 +13,10 @@ from app.simulation.simulator import new_episodes
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_flying_last_adds_what_the_route_earns_and_changes_nothing(policy, family):
+def test_flying_last_adds_what_the_route_earns_and_changes_nothing(before, family):
     problem = generate(family, 5, 9, 3, np.random.default_rng([91, *family.encode()]))
     arrays, record = compile_problem(problem), problem_to_record(problem)
-    plans = play(policy.agent, arrays, np.zeros(8, np.int64), np.random.default_rng(1)).plans
+    plans = play(before.agent, arrays, np.zeros(8, np.int64), np.random.default_rng(1)).plans
     episodes, place = new_episodes(arrays, 1), np.empty(5, np.int64)
     steps, alone = plans.shape[1], 0
     loads, needs = np.empty(3), np.empty((steps, 3))
@@ -26,9 +26,9 @@ def test_flying_last_adds_what_the_route_earns_and_changes_nothing(policy, famil
             others = fly_routes(arrays, episodes, np.ascontiguousarray(plan.T), place, held, i)
             assert (held[:, i] == 9).all()
             route = np.ascontiguousarray(other[:, i])
-            before = [column.copy() for column in episodes]
+            kept = [column.copy() for column in episodes]
             added = fly_last(arrays, episodes, i, route, loads, needs)
-            assert all(np.array_equal(*pair) for pair in zip(before, episodes, strict=True))
+            assert all(np.array_equal(*pair) for pair in zip(kept, episodes, strict=True))
             routes, flown = np.ascontiguousarray(held.T), np.empty_like(plan)
             routes[i] = route
             together = fly_routes(arrays, episodes, routes, place, flown)

@@ -4,7 +4,7 @@ import numpy as np
 from referee import replay
 
 from app.domain.records import problem_to_record
-from app.learning.universal.episodes.rollout import play, play_in_orders
+from app.learning.universal.episodes.rollout import play
 from app.learning.universal.episodes.turn_order import (
     draw_orders,
     reorder,
@@ -18,14 +18,14 @@ from app.simulation.replay import replay as replayed
 from app.simulation.stacks import stack
 
 
-def test_a_plan_earns_the_same_under_other_indices(make_policy):
+def test_a_plan_earns_the_same_under_other_indices(make_before):
     rng = np.random.default_rng(0)
     for number in range(20):
         problem = generate("deadline", 4, 8, 2, rng)
         arrays = compile_problem(problem)
         orders = draw_orders(3, 4, rng)
         several = reorder(stack([arrays] * 3), orders)
-        played = play(make_policy(number % 3).agent, several, np.arange(3))
+        played = play(make_before(number % 3).agent, several, np.arange(3))
         plans = restore_plans(played.plans, orders)
         again = replayed(several, reorder_plans(plans, orders), np.arange(3))
         assert np.array_equal(played.plans, reorder_plans(plans, orders))
@@ -47,14 +47,3 @@ def test_the_first_order_is_that_of_the_indices():
     assert (np.sort(orders, axis=1) == np.arange(5)).all()
     assert len(np.unique(orders, axis=0)) > 4
     assert some_orders(8, 1, rng).tolist() == [[0]]
-
-
-def test_roll_outs_come_in_the_order_asked_for(make_policy):
-    problem = generate("uniform", 5, 10, 3, np.random.default_rng(2))
-    arrays, agent = compile_problem(problem), make_policy(1).agent
-    orders = some_orders(3, 5, np.random.default_rng(3))
-    plans = play_in_orders(agent, arrays, orders, 2)
-    assert plans.shape == (6, problem.max_steps, 5)
-    assert np.array_equal(plans[0], plans[1])
-    assert np.array_equal(plans[:1], play(agent, arrays, np.zeros(1, np.int64)).plans)
-    assert not all(np.array_equal(plans[0], other) for other in plans[2:])

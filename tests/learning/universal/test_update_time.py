@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.pairwise.architecture import PairwiseConfig
 from app.learning.universal.request.fine_tuning import FineTuning
-from app.learning.universal.updates.update_time import UpdateTime
+from app.learning.universal.request.update_time import UpdateTime
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers.greedy import greedy_plan
@@ -32,7 +32,7 @@ def problem():
 
 @pytest.mark.parametrize("bootstrap", [False, True])
 def test_the_next_update_is_expected_to_take_what_the_last_one_did(problem, bootstrap):
-    times = UpdateTime(compile_problem(problem), UniversalConfig())
+    times = UpdateTime(compile_problem(problem), PairwiseConfig())
     other = times.expected(50, bootstrap=not bootstrap)
     times.took(50, 0.125, bootstrap=bootstrap)
     assert times.expected(50, bootstrap=bootstrap) == pytest.approx(0.125)
@@ -43,7 +43,7 @@ def test_the_next_update_is_expected_to_take_what_the_last_one_did(problem, boot
 def test_larger_ones_are_expected_to_take_longer():
     rng = np.random.default_rng(1)
     small, large = (compile_problem(generate("uniform", m, n, 3, rng)) for m, n in ((5, 10), (20, 30)))
-    config, wide = UniversalConfig(), UniversalConfig(width=128)
+    config, wide = PairwiseConfig(), PairwiseConfig(width=128)
     expected = [
         UpdateTime(small, config).expected(30, bootstrap=False),
         UpdateTime(small, config).expected(30, bootstrap=True),

@@ -1,7 +1,7 @@
 """How much a request is given where it does not say: by the size of its problem, never by the clock.
 
-A size is weighed by what the policy costs on it: a turn compares N targets with each other and each with M
-rivals, and there are M turns in each of S steps.
+A size is weighed by what the policy costs on it: an answer compares all UAVs and places with each other, and
+there are some answers in each of S steps.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.learning.universal.episodes.played import answers_a_step
 from app.simulation.arrays import ProblemArrays
 from app.solvers.local_search.effort import default_moves
 
@@ -19,7 +20,7 @@ _MOST_WORK = 6e7
 _CHOOSING_WORK = 3e6
 """Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
 
-_POLICIES = 5
+_POLICIES = 3
 _ORDERS = 6
 
 _SAMPLING_WORK = 6e6
@@ -84,7 +85,9 @@ def effort(arrays: ProblemArrays) -> Effort:
 def roll_out_work(arrays: ProblemArrays) -> float:
     """Weigh a greedy roll-out: 20 million take about a second."""
     m, n, _ = arrays.shape
-    return float(m * int(arrays.max_steps[0]) * n * (m + 0.25 * n + 50))
+    tokens = m + n + arrays.n_bases
+    answer = 124 * tokens + 0.05 * tokens**2 + 3 * m * n
+    return float(int(arrays.max_steps[0]) * answers_a_step(m) * answer)
 
 
 def episodes_of(arrays: ProblemArrays, learned: int) -> int:
@@ -96,5 +99,5 @@ def episodes_of(arrays: ProblemArrays, learned: int) -> int:
 def batch_of(arrays: ProblemArrays, most: int) -> int:
     """Return how many episodes may be played at once within 64 MiB, at least 1 and at most `most`."""
     m, n, _ = arrays.shape
-    episode = 400 * n * m + 64 * (n + 1) ** 2 + 4000 * n
+    episode = 1000 * n * m + 4000 * (m + n)
     return max(1, min(most, 2**26 // episode))

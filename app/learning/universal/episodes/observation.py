@@ -16,7 +16,7 @@ import numpy as np
 
 from app.learning.compute.kernels import Float32s
 from app.learning.universal.network.architecture import RIVAL_FEATURES
-from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
 from app.simulation.legs import UNREACHABLE
@@ -61,6 +61,8 @@ class VisitGains(NamedTuple):
         (B, M, N) reward of a visit now; FORBIDDEN where it is not allowed.
     unloaded
         (B, M, N) amounts it would unload, all materials together.
+    acted
+        (B, M) UAVs that have acted in this step; the roll-out keeps it.
     first, second
         (M,) scratch: the best and the second best of each UAV's visits.
     """
@@ -71,6 +73,7 @@ class VisitGains(NamedTuple):
     near: Integers
     net: Floats
     unloaded: Floats
+    acted: Flags
     first: Floats
     second: Floats
 
@@ -120,6 +123,7 @@ def new_gains(arrays: ProblemArrays, batch: int) -> VisitGains:
         near=np.ascontiguousarray(near, dtype=np.int64),
         net=np.empty((batch, m, n)),
         unloaded=np.empty((batch, m, n)),
+        acted=np.zeros((batch, m), np.bool_),
         first=np.empty(m),
         second=np.empty(m),
     )
@@ -231,7 +235,7 @@ def observe(
         for other in range(m):
             other_net = gains.net[b, other, j]
             seen = rivals[j, other]
-            if other == i or other_net <= FORBIDDEN or (other < i and steps_left <= 1):
+            if other == i or other_net <= FORBIDDEN or (gains.acted[b, other] and steps_left <= 1):
                 for f in range(RIVAL_FEATURES):
                     seen[f] = 0.0
                 continue
@@ -241,7 +245,7 @@ def observe(
             seen[1] = squash(other_net / scale)
             seen[2] = squash((other_net - max(its_elsewhere, 0.0)) / scale)
             seen[3] = gains.unloaded[b, other, j] / need
-            seen[4] = 1.0 if other > i else 0.0
+            seen[4] = 0.0 if gains.acted[b, other] else 1.0
             seen[5] = min(leg_to(arrays, episodes, b, other, j) / span, _FAR)
             supply += gains.unloaded[b, other, j]
             if other_net > best:
@@ -283,7 +287,7 @@ def observe(
         row[21] = squash(follow_up / scale)
         row[22] = squash((net + follow_up) / scale) if allowed else -1.0
         row[23] = squash(regret / scale)
-        row[24] = 1.0 if rival > i else 0.0
+        row[24] = 1.0 if rival >= 0 and not gains.acted[b, rival] else 0.0
         row[25] = squash((net - max(mine_elsewhere, 0.0)) / scale) if allowed else -1.0
         row[26] = value / (value + cost) if value > 0.0 else 0.0
         row[27] = 1.0 if need > 0.0 and unloaded >= need * (1.0 - 1e-9) else 0.0
@@ -307,8 +311,9 @@ def _observe_self(
     steps = arrays.max_steps[p]
     steps_left = steps - episodes.step[b]
     load = start_load = most = swarm = 0.0
-    out = 0
+    out = place = 0
     for other in range(m):
+        place += gains.acted[b, other]
         carried = 0.0
         for k in range(materials):
             carried += episodes.load[b, other, k]
@@ -348,7 +353,7 @@ def _observe_self(
     own[17] = covered / swarm if swarm > 0.0 else 0.0
     own[18] = squash(arrays.terms[p].weight * span / scale)
     own[19] = out / m
-    own[20] = (i + 0.5) / m
+    own[20] = (place + 0.5) / m
     own[21] = 1.0 / n
 
 

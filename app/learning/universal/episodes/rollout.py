@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from app.learning.compute.kernels import Float32s
-from app.learning.parameters import SERVICE_EPSILON
 from app.learning.universal.episodes.observation import (
     FORBIDDEN,
     VisitGains,
@@ -18,7 +16,7 @@ from app.learning.universal.episodes.observation import (
     new_gains,
     observe,
 )
-from app.learning.universal.episodes.turn_order import reorder, restore_plans
+from app.learning.universal.episodes.played import Played
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import OWN_FEATURES, PAIR_FEATURES, RIVAL_FEATURES
 from app.learning.universal.network.inference import ask_together, attention_bias, compile_agent
@@ -28,26 +26,6 @@ from app.simulation.episodes import Episodes
 from app.simulation.simulator import act, close, end_step, new_episodes
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
-
-
-def exploration(episodes: int) -> Floats:
-    """Return the ``epsilon`` (B,) of episodes of which every other one explores."""
-    return np.where(np.arange(episodes) % 2, SERVICE_EPSILON, 0.0)
-
-
-class Played(NamedTuple):
-    """B episodes that were played.
-
-    Attributes
-    ----------
-    plans
-        (B, S, M) joint actions; rows after an episode's end send everybody home.
-    rewards
-        (B,)
-    """
-
-    plans: Integers
-    rewards: Floats
 
 
 def play(
@@ -98,7 +76,10 @@ def play(
     turn = np.empty(batch, np.int64)
     branch, branches = problem.copy(), len(bias)
     for s in range(steps):
+        gains.acted[:] = False
         for i in range(m):
+            if i:
+                gains.acted[:, i - 1] = True
             if stop():
                 _send_home(arrays, episodes, rewards)
                 return Played(plans, rewards)
@@ -142,41 +123,6 @@ def play(
         if episodes.done.all():
             break
     return Played(plans, rewards)
-
-
-def play_in_orders(
-    agent: UniversalAgent,
-    arrays: ProblemArrays,
-    orders: Integers,
-    repeats: int = 1,
-    rng: np.random.Generator | None = None,
-    temperature: float = 1.0,
-    stop: StopCriterion = never,
-    spare: Callable[[], int] = no_spare_threads,
-) -> Integers:
-    """Play one problem with its UAVs taking turns in several orders; return plans (Q * repeats, S, M).
-
-    Where two UAVs are at one target in the same step, what a plan earns, even whether it is allowed, can
-    differ from the episode that was played: the simulator lets UAVs act by their index. So replay the plans.
-
-    Parameters
-    ----------
-    agent, rng, temperature, stop, spare
-        As :func:`play` has them.
-    arrays
-        A stack of one problem.
-    orders
-        (Q, M), as :mod:`~app.learning.universal.episodes.turn_order` has them.
-    repeats
-        Episodes in each order.
-    """
-    count = len(orders)
-    several = ProblemArrays(
-        **{name: np.repeat(column, count, axis=0) for name, column in arrays._asdict().items()}
-    )
-    episodes = np.repeat(np.arange(count), repeats)
-    played = play(agent, reorder(several, orders), episodes, rng, temperature, stop, spare)
-    return restore_plans(played.plans, orders[episodes])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -86,8 +86,10 @@ def _replay_turns(
         for s in range(plans.shape[1]):
             if episodes.done[b]:
                 break
+            gains.acted[b] = False
             for i in range(plans.shape[2]):
                 if episodes.ret[b, i]:
+                    gains.acted[b, i] = True
                     continue
                 observe(
                     arrays,
@@ -103,6 +105,7 @@ def _replay_turns(
                 turns.episode[count], turns.step[count], turns.uav[count] = b, s, i
                 turns.reward[b, s] += act(arrays, episodes, b, i, plans[b, s, i])
                 look_again(arrays, episodes, gains, b, i, plans[b, s, i])
+                gains.acted[b, i] = True
                 count += 1
             turns.reward[b, s] += end_step(arrays, episodes, b)
     return count

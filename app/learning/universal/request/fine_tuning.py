@@ -10,18 +10,20 @@ import numpy as np
 
 from app.domain.errors import ProblemTooLarge
 from app.learning.compute.device import learning_device
+from app.learning.pairwise.learner import Learner, make_batch, make_decisions
+from app.learning.pairwise.policy import PairwisePolicy
+from app.learning.pairwise.states import all_turns, some_states
 from app.learning.universal.episodes.effort import batch_of, episodes_of
-from app.learning.universal.episodes.rollout import exploration, play
-from app.learning.universal.episodes.turns import replay_turns
-from app.learning.universal.network.policy import UniversalPolicy
-from app.learning.universal.updates.learner import Learner, make_batch
-from app.learning.universal.updates.update_time import UpdateTime
+from app.learning.universal.episodes.played import exploration
+from app.learning.universal.request.update_time import UpdateTime
 from app.simulation.arrays import Integers, ProblemArrays
-from app.simulation.stacks import stack
 from app.solvers.protocol import StopCriterion, no_spare_threads
 
 TURN_TOKENS = 4000
 """Tokens of own episodes an epoch learns from at most: turns times targets."""
+
+_STATES = 32
+"""States of the best plan that an epoch learns from at most."""
 
 _TD_EVERY = 4
 """Every so many epochs, from the first, the TD loss is learned too; it takes longer than all the rest."""
@@ -40,8 +42,9 @@ def require_memory(arrays: ProblemArrays) -> None:
     """
     m, n, _ = arrays.shape
     steps = int(arrays.max_steps[0])
-    # Biases and weights of attention a pair of tokens, activations a token and a rival.
-    needed = m * steps * (300 * (n + 1) ** 2 + 10_000 * n + 700 * n * m)
+    tokens = m + n + arrays.n_bases
+    # Biases and weights of attention a pair of tokens, activations a token and a pair, of one episode.
+    needed = m * steps * (300 * tokens**2 + 10_000 * tokens + 1_500 * n * m)
     if needed > MAX_BYTES:
         raise ProblemTooLarge(
             f"fine-tuning on {m} UAVs and {n} targets over {steps} steps takes {needed / 2**20:.0f} MiB; "
@@ -70,7 +73,7 @@ class FineTuning:
 
     def __init__(
         self,
-        policy: UniversalPolicy,
+        policy: PairwisePolicy,
         arrays: ProblemArrays,
         *,
         batch_size: int,
@@ -111,8 +114,7 @@ class FineTuning:
             At which their actions are drawn.
         """
         problem = np.zeros(episodes or self._played, np.int64)
-        plans = play(
-            self.policy.agent,
+        plans = self.policy.play(
             self._arrays,
             problem,
             self._rng,
@@ -122,24 +124,34 @@ class FineTuning:
             exploration(len(problem)),
         ).plans
         if self._epochs % _TD_EVERY == 0:
-            self._learn(plans[: self._learned], stop, imitate=False)
+            self._learn_rewards(plans[: self._learned], stop)
         self._epochs += 1
         if (best < self._arrays.shape[1]).any():
-            self._learn(best[None], stop, imitate=True)
+            self._imitate(best, stop)
         return plans
 
-    def _learn(self, plans: Integers, stop: StopCriterion, *, imitate: bool) -> None:
+    def _learn_rewards(self, plans: Integers, stop: StopCriterion) -> None:
+        """Take one step by what some episodes earned."""
+        turns = [each for each in (all_turns(self._arrays, plan) for plan in plans) if len(each.step)]
+        if turns:
+            decisions = make_decisions(turns, self._device)
+            count = len(decisions.uav)
+            self._learn(count, True, lambda: self._learner.update(1.0, decisions=decisions, stop=stop), stop)
+
+    def _imitate(self, plan: Integers, stop: StopCriterion) -> None:
+        """Take one step towards a plan."""
+        states = some_states(self._arrays, plan, _STATES, self._rng)
+        if len(states.action):
+            batch = make_batch([states], self._device)
+            count = len(states.action)
+            self._learn(count, False, lambda: self._learner.update(1.0, batch, stop=stop), stop)
+
+    def _learn(
+        self, states: int, bootstrap: bool, update: Callable[[], dict[str, float]], stop: StopCriterion
+    ) -> None:
         """Take one step, unless its time is up, or would be before its end."""
         begun = time.monotonic()
-        n = self._arrays.shape[1]
-        visits_and_returns = int((plans < n).sum()) + plans.shape[0] * plans.shape[2]
-        expected = self._time.expected(visits_and_returns, bootstrap=not imitate)
-        if stop() or expected > stop.seconds_left():
+        if stop() or self._time.expected(states, bootstrap=bootstrap) > stop.seconds_left():
             return
-        problem = np.zeros(len(plans), np.int64)
-        turns = replay_turns(self._arrays, problem, plans)
-        stacked = stack([self._arrays] * len(plans))
-        batch = make_batch(stacked, turns, self._device)
-        if self._learner.update(batch, 1.0, imitate=imitate, bootstrap=not imitate, stop=stop):
-            took = time.monotonic() - begun
-            self._time.took(visits_and_returns, took, bootstrap=not imitate)
+        if update():
+            self._time.took(states, time.monotonic() - begun, bootstrap=bootstrap)

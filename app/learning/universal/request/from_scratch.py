@@ -10,17 +10,15 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode, has_finite_weights
+from app.learning.pairwise.architecture import HEADS, WIDEST, PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import LEARNING_RATE, QmixParameters
 from app.learning.universal.episodes.best_plan import BestPlan
-from app.learning.universal.episodes.rollout import play
 from app.learning.universal.episodes.temperature import Temperature
-from app.learning.universal.network.architecture import HEADS, WIDEST, UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.request.recombination import Recombination
 from app.simulation.arrays import ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
-from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import History, Progress, Report, Solution, StopCriterion
 from app.solvers.seeds import seed_sequence
@@ -50,13 +48,12 @@ class UniversalFromScratch:
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
         width = min(WIDEST, -(-parameters.drqn_hidden_dim // HEADS) * HEADS)
         self._parameters = parameters.in_service().model_copy(update={"drqn_hidden_dim": width})
-        self._config = UniversalConfig(width=width, qmix_hidden_dim=parameters.qmix_hidden_dim)
-        # The networks know no reloads.
-        self._arrays = without_reloads(compile_problem(problem))
+        self._config = PairwiseConfig(width=width, qmix_hidden_dim=parameters.qmix_hidden_dim)
+        self._arrays = compile_problem(problem)
         self._best = BestPlan(self._arrays)
         self._history = History()
         initial, episodes = seed_sequence(seed).spawn(2)
-        policy = UniversalPolicy.of_seed(self._config, int(initial.generate_state(1)[0]))
+        policy = PairwisePolicy.of_seed(self._config, int(initial.generate_state(1)[0]))
         self._tuning = FineTuning(
             policy,
             self._arrays,
@@ -73,8 +70,7 @@ class UniversalFromScratch:
             # Nobody can fly anywhere, so there is nothing to learn.
             self._history.add(0, self._best.reward)
             return self._solution(0)
-        if not self._problem.bases:
-            self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
+        self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
         self._evaluate(0)
         temperature = Temperature(self._arrays)
         recombination = Recombination(self._arrays, self._best)
@@ -85,7 +81,10 @@ class UniversalFromScratch:
                 # It would play at random and could not be kept; the plans so far are as good as ever.
                 break
             temperature.follow(plans, self._best.reward)
-            recombination.consider(plans, self._stop)
+            if self._problem.bases:
+                self._best.consider(plans)
+            else:
+                recombination.consider(plans, self._stop)
             done += count
             if (done - count) // every < done // every or done == epochs:
                 self._evaluate(done)
@@ -94,7 +93,7 @@ class UniversalFromScratch:
 
     def _evaluate(self, done: int) -> None:
         """Play greedily; what was cut short is no evaluation, but for the first, which there has to be."""
-        played = play(self._tuning.policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
+        played = self._tuning.policy.play(self._arrays, np.zeros(1, np.int64), stop=self._stop)
         self._best.consider(played.plans)
         if done == 0 or not self._stop():
             self._history.add(done, float(played.rewards[0]))

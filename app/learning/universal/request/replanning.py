@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.learning.universal.episodes.rollout import exploration, play
+from app.learning.universal.episodes.played import AnySizePolicy, exploration
 from app.learning.universal.episodes.routes import fly_routes
-from app.learning.universal.network.agent import UniversalAgent
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
@@ -110,7 +109,7 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
 
 
 def replan(
-    agent: UniversalAgent,
+    policy: AnySizePolicy,
     arrays: ProblemArrays,
     plan: Integers,
     episodes: int,
@@ -122,8 +121,8 @@ def replan(
 
     Parameters
     ----------
-    agent
-        The policy.
+    policy
+        Plays them.
     arrays
         A stack of one problem.
     plan
@@ -149,7 +148,7 @@ def replan(
     left, uavs, targets = residual_of(arrays, plan, groups, rng)
     which = np.repeat(np.arange(len(groups)), _EPISODES)[:episodes]
     epsilon = exploration(episodes)
-    played = play(agent, left, which, rng, stop=stop, spare=spare, epsilon=epsilon).plans
+    played = policy.play(left, which, rng, stop=stop, spare=spare, epsilon=epsilon).plans
     plans = np.empty((episodes + 1, *plan.shape), np.int64)
     _insert(arrays, new_episodes(arrays, 1), plan, left.ret, uavs, targets, which, played, plans)
     return plans

@@ -16,19 +16,19 @@ import numpy as np
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode, has_finite_weights
 from app.learning.checkpoints.source_policies import Source
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import FINE_TUNING_LR, REPLANS_A_SAMPLE, TransferQmixParameters
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.effort import Effort, batch_of, effort
-from app.learning.universal.episodes.rollout import play, play_in_orders
+from app.learning.universal.episodes.played import AnySizePolicy
 from app.learning.universal.episodes.temperature import Temperature
-from app.learning.universal.episodes.turn_order import some_orders
+from app.learning.universal.episodes.variety import roll_outs, samples
 from app.learning.universal.network.parallel import in_parallel
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.fine_tuning import FineTuning, require_memory
 from app.learning.universal.request.polishing import polish
 from app.learning.universal.request.recombination import Recombination
 from app.learning.universal.request.replanning import replan, round_of
-from app.simulation.arrays import Integers, compile_problem
+from app.simulation.arrays import Integers, ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
 from app.simulation.stacks import without_reloads
 from app.solvers.greedy import greedy_plan
@@ -83,9 +83,7 @@ class UniversalTransfer:
     ) -> None:
         self._spare = spare
         self._problem, self._seed, self._stop, self._report = problem, seed, stop, report
-        # The policy knows no reloads; the search that polishes its plans does.
-        self._whole = compile_problem(problem)
-        self._arrays = without_reloads(self._whole)
+        self._arrays = compile_problem(problem)
         self._effort = effort(self._arrays)
         self._used = fill_in(parameters, self._effort)
         self._asked_once = parameters.orders == 1
@@ -94,8 +92,7 @@ class UniversalTransfer:
         self._history = History()
         root = seed_sequence(seed)
         streams = map(np.random.default_rng, root.spawn(5))
-        self._sampling, self._tuning, self._polishing, ordering, self._replanning = streams
-        self._orders = some_orders(self._used.orders, problem.n_uavs, ordering)
+        self._sampling, self._tuning, self._polishing, self._ordering, self._replanning = streams
 
     def run(self, sources: Sequence[Source]) -> Solution:
         """Solve it from the best of some policies for every size, nearest first.
@@ -108,33 +105,27 @@ class UniversalTransfer:
         used, checkpoint = self._used, None
         if used.n_epochs:
             require_memory(self._arrays)
-        grounded = bool(new_episodes(self._arrays, 1).done[0])
-        if grounded and not self._problem.bases:
+        if new_episodes(self._arrays, 1).done[0]:
             # Nobody can fly anywhere: every policy would stay at home.
             self._history.add(0, self._best.reward)
             return Solution(self._best.plan, self._history, used.parameters, sources[0].policy)
         by_rule = None if used.is_bare else greedy_plan(self._problem, self._stop).as_array()[None]
-        if by_rule is not None and not self._problem.bases:
+        if by_rule is not None:
             self._best.consider(by_rule)
         source = None
         policy_plays = self._effort.policy or used.is_bare or used.parameters.source is not None
-        if policy_plays and not grounded:
+        if policy_plays:
             source, reward = self._roll_out(sources)
             self._history.add(0, reward)
             self._tell("roll-out", 1.0)
-            policy = cast(UniversalPolicy, source.network)
+            policy = cast(AnySizePolicy, source.network)
             self._sample(policy)
             self._replan(policy)
             checkpoint = self._fine_tune(policy)
         else:
             self._history.add(0, self._best.reward)
-        if self._problem.bases:
-            played, self._best = self._best.actions, BestPlan(self._whole)
-            self._best.consider(played[None])
-            if by_rule is not None:
-                self._best.consider(by_rule)
         polish(
-            self._whole,
+            self._arrays,
             self._best,
             used.polish_moves,
             self._polishing,
@@ -144,54 +135,66 @@ class UniversalTransfer:
         found = None if source is None else source.policy
         return Solution(self._best.plan, self._history, used.parameters, found, checkpoint)
 
+    def _played(self, policy: AnySizePolicy) -> ProblemArrays:
+        """Return the problem as a policy plays it: where it knows no reloads, up to the first of them."""
+        return self._arrays if policy.knows_reloads else without_reloads(self._arrays)
+
+    def _consider(self, plans: Integers) -> None:
+        """Look at plans, and at what can be put together of their routes, where these have no reloads."""
+        if self._problem.bases:
+            self._best.consider(plans)
+        else:
+            self._recombination.consider(plans, self._stop)
+
     def _roll_out(self, sources: Sequence[Source]) -> tuple[Source, float]:
         """Play each policy greedily; return the best, among equals the nearest, and what it earned."""
         found: list[tuple[Source, float]] = []
-        tried, orders = sources[: self._effort.policies], self._orders
+        tried, count = sources[: self._effort.policies], self._used.orders
         if self._used.is_bare:
             # As many roll-outs as of one policy in all orders, which earn no more.
             tried = tried[: 1 if self._asked_once else _TRIED_AT_SIGHT]
-            orders = orders[: -(-len(orders) // len(tried))]
+            count = -(-count // len(tried))
+        seeds = self._ordering.integers(2**63, size=len(tried))
 
-        def play_from(source: Source) -> Integers:
-            policy = cast(UniversalPolicy, source.network)
-            return play_in_orders(policy.agent, self._arrays, orders, stop=self._stop, spare=within)
+        def play_from(place: int) -> Integers:
+            policy = cast(AnySizePolicy, tried[place].network)
+            rng = np.random.default_rng(seeds[place])
+            return roll_outs(policy, self._played(policy), count, rng, self._stop, within)
 
         # Where policies are played side by side, there is no core left for the turns of one of them.
         spare = self._spare()
         within = self._spare if len(tried) == 1 else no_spare_threads
-        for source, plans in zip(tried, in_parallel(play_from, tried, spare), strict=False):
+        for source, plans in zip(tried, in_parallel(play_from, range(len(tried)), spare), strict=False):
             found.append((source, self._best.consider(plans)))
             if not self._used.is_bare:
-                self._recombination.consider(plans, self._stop)
+                self._consider(plans)
             if self._stop():
                 break
         return max(found, key=lambda each: each[1])
 
-    def _sample(self, policy: UniversalPolicy) -> None:
-        done, samples = 0, self._used.samples
-        while done < samples and not self._stop():
-            count = batch_of(self._arrays, samples - done)
-            orders = self._orders[: max(1, min(count, len(self._orders)))]
-            repeats = -(-count // len(orders))
-            plans = play_in_orders(
-                policy.agent,
-                self._arrays,
-                orders,
-                repeats,
+    def _sample(self, policy: AnySizePolicy) -> None:
+        done, wanted = 0, self._used.samples
+        while done < wanted and not self._stop():
+            count = batch_of(self._arrays, wanted - done)
+            plans = samples(
+                policy,
+                self._played(policy),
+                count,
+                self._used.orders,
                 self._sampling,
-                stop=self._stop,
-                spare=self._spare,
-            )[:count]
-            self._recombination.consider(plans, self._stop)
+                self._stop,
+                self._spare,
+            )
+            self._consider(plans)
             done += count
-            self._tell("samples", done / samples)
+            self._tell("samples", done / wanted)
 
-    def _replan(self, policy: UniversalPolicy) -> None:
-        done, replans = 0, self._used.replans
+    def _replan(self, policy: AnySizePolicy) -> None:
+        # A group's problem has no reloads.
+        done, replans = 0, 0 if self._problem.bases else self._used.replans
         while done < replans and not self._stop():
             plans = replan(
-                policy.agent,
+                policy,
                 self._arrays,
                 self._best.actions,
                 min(round_of(replans), replans - done),
@@ -205,10 +208,11 @@ class UniversalTransfer:
             done += round_of(replans)
             self._tell("replans", min(1.0, done / replans))
 
-    def _fine_tune(self, policy: UniversalPolicy) -> bytes | None:
+    def _fine_tune(self, policy: AnySizePolicy) -> bytes | None:
         """Fine-tune a copy; its checkpoint, or None where no epoch was done."""
         used, best = self._used, self._best
-        if not used.n_epochs or self._stop():
+        if not used.n_epochs or self._stop() or not isinstance(policy, PairwisePolicy):
+            # Policies of the architecture before are played, and not trained any more.
             return None
         parameters = used.parameters
         tuning = FineTuning(
@@ -227,10 +231,10 @@ class UniversalTransfer:
                 # It would play at random and could not be kept; the plans so far are as good as ever.
                 break
             temperature.follow(plans, best.reward)
-            self._recombination.consider(plans, self._stop)
+            self._consider(plans)
             done += 1
             if done % parameters.evaluate_per_epoch == 0 or done == used.n_epochs:
-                played = play(tuning.policy.agent, self._arrays, np.zeros(1, np.int64), stop=self._stop)
+                played = tuning.policy.play(self._arrays, np.zeros(1, np.int64), stop=self._stop)
                 best.consider(played.plans)
                 if not self._stop():
                     self._history.add(done, float(played.rewards[0]))

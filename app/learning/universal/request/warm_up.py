@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import verify
 from app.learning.checkpoints.source_policies import Source
 from app.learning.compute.threads import one_thread
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import TransferQmixParameters
+from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.network.policy import UniversalPolicy
 from app.learning.universal.request.transfer import UniversalTransfer
+from app.simulation.arrays import compile_problem
+from app.simulation.stacks import without_reloads
 from app.solvers.protocol import SourcePolicy
 from app.solvers.stop import never
 
@@ -23,9 +29,11 @@ def warm_up(problem: Problem) -> None:
         Small; somebody can fly somewhere.
     """
     parameters = TransferQmixParameters(samples=2, n_epochs=1, polish_moves=100)
-    policy = UniversalPolicy.of_seed(UniversalConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
+    policy = PairwisePolicy.of_seed(PairwiseConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
+    before = UniversalPolicy.of_seed(UniversalConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
     source = SourcePolicy("", "", 0.0)
     with one_thread():
+        before.play(without_reloads(compile_problem(problem)), np.zeros(1, np.int64))
         transfer = UniversalTransfer(problem, parameters, 0, never, lambda _progress: None)
         solution = transfer.run([Source(source, policy)])
     if solution.checkpoint is None:

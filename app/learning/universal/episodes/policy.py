@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
+import numpy as np
 import torch
-from safetensors.torch import load_file
 from torch import nn
 
+from app.learning.universal.episodes.played import Played
+from app.learning.universal.episodes.rollout import play
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import UniversalConfig
 from app.learning.universal.network.mixer import UniversalMixer
-
-_STATE_PREFIXES = {"networks.0.0.": "agent.", "networks.0.1.": "mixer."}
-"""Names in a training's state, and in a checkpoint."""
+from app.simulation.arrays import Floats, Integers, ProblemArrays
+from app.solvers.protocol import StopCriterion, no_spare_threads
+from app.solvers.stop import never
 
 
 class UniversalPolicy(nn.Module):
-    """Both networks of ``qmix-universal-1``.
+    """Both networks of ``qmix-universal-1``; an
+    :class:`~app.learning.universal.episodes.played.AnySizePolicy`.
 
     Parameters
     ----------
     config
         Their sizes.
     """
+
+    takes_turns = True
+    knows_reloads = False
 
     def __init__(self, config: UniversalConfig) -> None:
         super().__init__()
@@ -40,18 +46,18 @@ class UniversalPolicy(nn.Module):
         policy.agent, policy.mixer = initial(config, seed)
         return policy
 
-    @classmethod
-    def of_training(cls, state: Path, config: UniversalConfig) -> UniversalPolicy:
-        """Take the networks out of a state that :func:`app.learning.universal.training.trainer.fit` wrote."""
-        policy, tensors = cls(config), load_file(state)
-        named = {
-            new + name.removeprefix(old): tensor
-            for old, new in _STATE_PREFIXES.items()
-            for name, tensor in tensors.items()
-            if name.startswith(old)
-        }
-        policy.load_state_dict(named, strict=True)
-        return policy
+    def play(
+        self,
+        arrays: ProblemArrays,
+        problem: Integers,
+        rng: np.random.Generator | None = None,
+        temperature: float = 1.0,
+        stop: StopCriterion = never,
+        spare: Callable[[], int] = no_spare_threads,
+        epsilon: Floats | None = None,
+    ) -> Played:
+        """Play episodes; see :func:`~app.learning.universal.episodes.rollout.play`."""
+        return play(self.agent, arrays, problem, rng, temperature, stop, spare, epsilon)
 
 
 def initial(config: UniversalConfig, seed: int) -> tuple[UniversalAgent, UniversalMixer]:

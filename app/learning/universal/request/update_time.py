@@ -6,7 +6,7 @@ of the first, a rate that most machines surpass.
 
 from __future__ import annotations
 
-from app.learning.universal.network.architecture import UniversalConfig
+from app.learning.pairwise.architecture import PairwiseConfig
 from app.simulation.arrays import ProblemArrays
 
 _RATE = 2.5e9
@@ -15,8 +15,8 @@ _RATE = 2.5e9
 _FIXED = 5e7
 """Multiplications that could be made while torch is called for an update of nothing."""
 
-_RIVAL_WIDTHS = 12
-"""Multiplications for a target and rival, in widths; most of its time goes to memory."""
+_PAIR_WIDTHS = 120
+"""Multiplications for a UAV and a place, in widths; most of its time goes to memory."""
 
 
 class UpdateTime:
@@ -30,21 +30,21 @@ class UpdateTime:
         Of the policy that learns.
     """
 
-    def __init__(self, arrays: ProblemArrays, config: UniversalConfig) -> None:
+    def __init__(self, arrays: ProblemArrays, config: PairwiseConfig) -> None:
         m, n, _ = arrays.shape
-        width, tokens = config.width, n + 1
+        width, tokens = config.width, m + n + arrays.n_bases
         layer = tokens * (8 * width**2 + 2 * tokens * width)
-        self._turn = config.layers * layer + tokens * 6 * width**2 + n * m * _RIVAL_WIDTHS * width
+        self._state = config.layers * layer + tokens * 4 * width**2 + n * m * _PAIR_WIDTHS * width
         self._rate = {True: _RATE, False: _RATE}
 
-    def expected(self, turns: int, *, bootstrap: bool) -> float:
-        """Return the seconds that an update on so many turns will take."""
-        return self._work(turns, bootstrap) / self._rate[bootstrap]
+    def expected(self, states: int, *, bootstrap: bool) -> float:
+        """Return the seconds that an update on so many states will take."""
+        return self._work(states, bootstrap) / self._rate[bootstrap]
 
-    def took(self, turns: int, seconds: float, *, bootstrap: bool) -> None:
+    def took(self, states: int, seconds: float, *, bootstrap: bool) -> None:
         """Note what one took, in seconds."""
-        self._rate[bootstrap] = self._work(turns, bootstrap) / max(seconds, 1e-9)
+        self._rate[bootstrap] = self._work(states, bootstrap) / max(seconds, 1e-9)
 
-    def _work(self, turns: int, bootstrap: bool) -> float:
+    def _work(self, states: int, bootstrap: bool) -> float:
         # Forward once and backward at twice that; with bootstrapping the target network too.
-        return _FIXED + (4 if bootstrap else 3) * turns * self._turn
+        return _FIXED + (4 if bootstrap else 3) * states * self._state
