@@ -40,6 +40,7 @@ from torch.nn import functional
 
 sys.path[:0] = [str(Path(__file__).parents[2])]
 
+from app.learning.universal.updates.learner import Learner, make_batch  # noqa: E402
 from at_once import play_at_once, replay_turns_at_once  # noqa: E402
 
 from app.learning.paper.architecture import QmixConfig  # noqa: E402
@@ -55,7 +56,6 @@ from app.learning.universal.network.architecture import UniversalConfig  # noqa:
 from app.learning.universal.network.mixer import UniversalMixer  # noqa: E402
 from app.learning.universal.training.curriculum import Shard  # noqa: E402
 from app.learning.universal.training.demonstrations import demonstrate, read_shard  # noqa: E402
-from app.learning.universal.updates.learner import Learner, make_batch  # noqa: E402
 from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
 from app.simulation.arrays import ProblemArrays  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
