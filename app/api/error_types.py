@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from html import escape
 
@@ -11,6 +12,7 @@ from starlette.responses import HTMLResponse
 
 from app.api.problem_types import ERROR_PAGE, PROBLEM_TYPES, ProblemType, status_of
 
+_CODE = re.compile("`([^`]+)`")
 _STYLE = """
 body { font: 11pt/1.4 system-ui, sans-serif; color: #111; background: #fff; max-width: 60rem }
 td, th { text-align: left; vertical-align: top; padding: .3rem .6rem; border-bottom: 1px solid #bbb }
@@ -46,5 +48,10 @@ def _rows(types: Mapping[str, ProblemType]) -> Iterator[str]:
         status = status_of(code)
         yield (
             f'<tr id="{code}"><td><code>{code}</code></td><td>{status.value} {escape(status.phrase)}</td>'
-            f"<td>{escape(kind.meaning)}</td><td>{escape(kind.remedy)}</td></tr>"
+            f"<td>{_words(kind.meaning)}</td><td>{_words(kind.remedy)}</td></tr>"
         )
+
+
+def _words(text: str) -> str:
+    """Write a text with code between backticks as HTML."""
+    return _CODE.sub(r"<code>\1</code>", escape(text))
