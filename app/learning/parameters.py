@@ -246,7 +246,7 @@ class TransferQmixParameters(_ModalParameters):
         ge=1,
         le=MAX_ORDERS,
         description="Roll-outs that policies are tried with: one is greedy, the others are sampled at a low "
-        "temperature; 1 is one policy, once; null: up to 6, by size",
+        "temperature; 1 is one policy, once; null: up to 12, by size",
     )
     samples: Annotated[int | None, _SERVICE] = Field(
         default=None,
@@ -260,6 +260,11 @@ class TransferQmixParameters(_ModalParameters):
         le=MAX_REPLANS,
         description="Sampled roll-outs of two to six UAVs in what the others of the best plan leave; null: "
         "three for each of samples where fine-tuning or polish follows, else none",
+    )
+    recombine: Annotated[bool | None, _SERVICE] = Field(
+        default=None,
+        description="Whether routes of all episodes are put together to plans, UAV by UAV, where there are no "
+        "bases; null: true, but for a single roll-out",
     )
     n_epochs: int | None = Field(
         default=None,

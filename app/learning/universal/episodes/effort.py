@@ -17,11 +17,11 @@ from app.solvers.local_search.effort import default_moves
 _MOST_WORK = 6e7
 """Work of a greedy roll-out that is done without being asked for; some seconds."""
 
-_CHOOSING_WORK = 3e6
+_CHOOSING_WORK = 8e6
 """Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
 
 _POLICIES = 3
-_ORDERS = 6
+_ORDERS = 12
 
 _SAMPLING_WORK = 6e6
 """Work of all sampled roll-outs together; about a third of a second."""

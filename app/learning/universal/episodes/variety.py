@@ -12,7 +12,7 @@ from app.simulation.arrays import Integers, ProblemArrays
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
 
-_COOL = 0.5
+_COOL = 0.7
 """Temperature of roll-outs beside the greedy one: good ones that differ."""
 
 

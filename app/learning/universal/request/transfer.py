@@ -52,6 +52,7 @@ class Used:
     replans: int
     n_epochs: int
     polish_moves: int
+    recombine: bool
 
     @property
     def is_bare(self) -> bool:
@@ -141,7 +142,7 @@ class UniversalTransfer:
 
     def _consider(self, plans: Integers) -> None:
         """Look at plans, and at what can be put together of their routes, where these have no reloads."""
-        if self._problem.bases:
+        if self._problem.bases or not self._used.recombine:
             self._best.consider(plans)
         else:
             self._recombination.consider(plans, self._stop)
@@ -166,8 +167,7 @@ class UniversalTransfer:
         within = self._spare if len(tried) == 1 else no_spare_threads
         for source, plans in zip(tried, in_parallel(play_from, range(len(tried)), spare), strict=False):
             found.append((source, self._best.consider(plans)))
-            if not self._used.is_bare:
-                self._consider(plans)
+            self._consider(plans)
             if self._stop():
                 break
         return max(found, key=lambda each: each[1])
@@ -204,7 +204,7 @@ class UniversalTransfer:
             )
             if not len(plans):
                 return
-            self._recombination.consider(plans, self._stop)
+            self._consider(plans)
             done += round_of(replans)
             self._tell("replans", min(1.0, done / replans))
 
@@ -267,6 +267,8 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     # A request for samples alone is a request for a quick answer.
     replans = REPLANS_A_SAMPLE * samples if n_epochs or moves else 0
     replans = replans if parameters.replans is None else parameters.replans
+    single = orders == 1 and not (samples or replans or n_epochs)
+    recombine = not single if parameters.recombine is None else parameters.recombine
     filled = parameters.in_service().model_copy(
         update={
             "orders": orders,
@@ -275,6 +277,7 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
             "n_epochs": n_epochs,
             "polish": polished,
             "polish_moves": moves,
+            "recombine": recombine,
         }
     )
-    return Used(filled, orders, samples, replans, n_epochs, moves)
+    return Used(filled, orders, samples, replans, n_epochs, moves, recombine)
