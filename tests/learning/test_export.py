@@ -89,6 +89,7 @@ def fly(session, policy, problem):
         if episodes.done[0]:
             break
         for i in range(m):
+            gains.acted[0] = np.arange(m) < i
             if episodes.ret[0, i]:
                 continue
             pair, own = np.empty((n, PAIR_FEATURES), np.float32), np.empty(OWN_FEATURES, np.float32)
