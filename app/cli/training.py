@@ -65,9 +65,9 @@ def train(
 
 
 def train_universal(
-    folder: Annotated[Path, typer.Option(help="Where the checkpoints are written.")],
-    work: Annotated[Path, typer.Option(help="Folder for demonstrations and states of trainings.")],
-    name: Annotated[str, typer.Option(help="Id of the general policy; a family's has the family behind it.")],
+    folder: Annotated[Path, typer.Option(help="Where the checkpoint is written.")],
+    work: Annotated[Path, typer.Option(help="Folder for searched plans and states of the training.")],
+    name: Annotated[str, typer.Option(help="Id of the policy, and stem of its file.")],
     workers: Annotated[int, typer.Option(min=1, help="Processes or threads.")] = os.cpu_count() or 1,
     executor: Annotated[
         Executor,
@@ -76,16 +76,15 @@ def train_universal(
         ),
     ] = Executor.LOCAL,
 ) -> None:
-    """Train the policies for every number of UAVs, areas and materials: a general one and one a family.
+    """Train the policy for every number of UAVs, areas and materials.
 
-    Near-optimal plans of generated problems are searched, and a network learns from them and from its own
-    episodes; copies of it are fitted to each family, on plans searched from what it does. A run that was
-    interrupted goes on where it stopped.
+    Plans of generated problems are searched, and a network learns from them; then it plays, what it should
+    have done is searched, and it learns from that too. A run that was interrupted goes on where it stopped.
     """
     # Loads torch, which the other commands need not wait for.
     from app.learning.universal.training import production  # noqa: PLC0415 - slow to load
 
-    with bar("policies for every size", total=1.0) as advance:
+    with bar("policy for every size", total=1.0) as advance:
 
         def tell(stage: str, share: float, said: str) -> None:
             advance(share, f"{stage} {said}")

@@ -162,7 +162,7 @@ def test_policies_that_cannot_serve_a_task_are_not_offered(client, policy):
     for similarity in ("summary", "paper"):
         assert policy["id"] in offered(similarity, wind={"speed": 0.1, "towards": 90})
         assert policy["id"] not in offered(similarity, no_fly_zones=zone)
-    assert set(offered("summary", no_fly_zones=zone).values()) == {"qmix-universal-1"}
+    assert set(offered("summary", no_fly_zones=zone).values()) == {"qmix-universal-2"}
     body = {
         **TASK,
         "no_fly_zones": zone,

@@ -37,7 +37,6 @@ from stopping import After  # noqa: E402
 from app.learning.parameters import QmixParameters, TransferQmixParameters  # noqa: E402
 from app.learning.qmix import Qmix  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
-from app.learning.universal.training.curriculum import Shard  # noqa: E402
 from app.learning.universal.training.demonstrations import demonstrate  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
@@ -103,8 +102,11 @@ def warm(method, url):
 
 def reference(number):
     """Reward of a searched plan."""
-    _, m, n, problem = problem_of(number)
-    return float(demonstrate(Shard(m, n, [problem], MOVES), np.random.default_rng(number)).rewards[0])
+    _, _, _, problem = problem_of(number)
+    shown = demonstrate(problem, MOVES, np.random.default_rng(number))
+    if shown is None:
+        raise ValueError(f"nothing can be earned in problem {number}")
+    return shown.reward
 
 
 def all_runs(options, url, file):

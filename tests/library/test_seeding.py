@@ -168,7 +168,9 @@ def test_a_library_of_a_version_without_records_gets_only_what_is_new(database, 
 
 def test_what_was_shipped_before_there_were_records_is_known():
     folder = Path(seeding.__file__).parent / "seed"
-    assert {file.stem for file in folder.glob("*.safetensors")} >= seeding.SHIPPED_BEFORE
+    still = {file.stem for file in folder.glob("*.safetensors")}
+    # The policies for every size have been replaced since, those for one size are the same.
+    assert {name for name in seeding.SHIPPED_BEFORE if not name.startswith("universal-3")} <= still
     assert len(seeding.SHIPPED_BEFORE) == 35
 
 

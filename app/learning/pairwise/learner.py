@@ -52,7 +52,7 @@ class Decisions(NamedTuple):
     episode, step, uav
         (T,) where each belongs, and who acts.
     reward
-        (B, S) rewards of the steps, in largest levels and a UAV.
+        (B, S) rewards of the steps, as :class:`~app.learning.pairwise.states.Turns` has them.
     """
 
     batch: Batch

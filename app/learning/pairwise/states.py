@@ -60,7 +60,7 @@ class Turns(NamedTuple):
     step, uav
         (T,) when, and who acted.
     reward
-        (S,) what each step earned, in largest levels and a UAV.
+        (S,) what each step earned, as a share of the levels of all areas that need something.
     """
 
     states: States
@@ -117,7 +117,13 @@ def all_turns(arrays: ProblemArrays, plan: Integers) -> Turns:
     actions = np.full((found, m), UNKNOWN, np.int64)
     actions[np.arange(found), uav[:found]] = action[:found]
     states = States(Seen(*(part[:found] for part in seen)), actions, nearness(arrays, gains.span)[0])
-    return Turns(states, step[:found], uav[:found], reward / gains.level[0] / m)
+    return Turns(states, step[:found], uav[:found], reward / _all_levels(arrays))
+
+
+def _all_levels(arrays: ProblemArrays) -> float:
+    """Return the sum of the levels of all areas that need something; never 0."""
+    levels = float(arrays.areas["level"][0][arrays.areas["need_total"][0] > 0].sum())
+    return levels if levels > 0 else 1.0
 
 
 @compiled

@@ -1,6 +1,6 @@
-"""From nothing to the files of all policies, and again without doing anything twice."""
+"""From nothing to the policy's file, and again without doing anything twice."""
 
-from dataclasses import replace
+import shutil
 
 import torch
 
@@ -10,10 +10,12 @@ from app.learning.universal.training.production import Production, UniversalTrai
 from app.simulation.generator import FAMILIES
 
 PARAMETERS = UniversalTrainingParameters(
-    shards=1,
-    updates=2,
-    family_shards=1,
-    family_updates=1,
+    plans=2,
+    rounds=1,
+    corrections=1,
+    size=2,
+    first_updates=3,
+    round_updates=2,
     width=8,
     layers=1,
     metric_problems=1,
@@ -22,34 +24,40 @@ PARAMETERS = UniversalTrainingParameters(
 SOME = {name: FAMILIES[name] for name in ("single_base", "mid_mission")}
 
 
-def test_a_second_run_finds_everything_done(tmp_path, monkeypatch):
+def written(folder):
+    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+
+
+def test_a_run_that_was_interrupted_goes_on_and_ends_with_the_same_file(tmp_path, monkeypatch):
     monkeypatch.setattr(production, "FAMILIES", SOME)
     told, threads = [], torch.get_num_threads()
     folder, work = tmp_path / "library", tmp_path / "work"
-    making = Production(work, PARAMETERS, 2, lambda stage, share, said: told.append((stage, share)))
-    files = making.run(folder, "all")
-    first = [file.read_bytes() for file in files]
-    changed = {path.name: path.stat().st_mtime_ns for path in work.iterdir()}
-
-    assert replace(making, workers=1).run(folder, "all") == files
-
-    assert [file.read_bytes() for file in files] == first
-    assert {path.name: path.stat().st_mtime_ns for path in work.iterdir()} == changed
+    making = Production(work, PARAMETERS, 1, lambda stage, share, said: told.append((stage, share)))
+    file = making.run(folder, "mine")
+    first, there = file.read_bytes(), written(work)
+    assert file == folder / "mine.safetensors"
     assert torch.get_num_threads() == threads
-    stages = [stage for stage, share in told if share == 1.0]
-    assert stages[:5] == ["demonstrations", "general", "families", "fresh problems", "metrics"]
-    assert [file.stem for file in files] == [
-        "all",
-        *(f"all-{family.replace('_', '-')}" for family in SOME),
-    ]
-    weights = set()
-    for file, families in zip(files, [list(SOME), *([family] for family in SOME)], strict=True):
-        checkpoint = decode(file.read_bytes())
-        assert checkpoint.metadata["families"] == families
-        ratios = [
-            value for name, value in checkpoint.metadata["metrics"].items() if name.startswith("greedy_ratio")
-        ]
-        assert len(ratios) == len(SOME)
-        assert all(ratio < 1.1 for ratio in ratios)
-        weights.add(b"".join(tensor.numpy().tobytes() for tensor in checkpoint.network.state_dict().values()))
-    assert len(weights) == len(files)
+    stages = ["plans", "fit 0", "corrections 1", "fit 1", "fresh problems", "metrics"]
+    assert [stage for stage, share in told if share == 1.0] == stages
+
+    # As after a power failure in the first fit.
+    left = tmp_path / "left"
+    shutil.copytree(work, left)
+    kept = {name for name in there if name.startswith("plans")}
+    for path in left.iterdir():
+        if path.name not in kept:
+            path.unlink()
+    before = written(left)
+    again = Production(left, PARAMETERS, 1, lambda *_said: None).run(tmp_path / "again", "mine")
+    assert again.read_bytes() == first
+    assert {name: written(left)[name] for name in kept} == before
+    assert set(written(left)) == set(there)
+
+    checkpoint = decode(first)
+    assert checkpoint.metadata["families"] == list(SOME)
+    assert checkpoint.metadata["parameters"] == PARAMETERS.model_dump(mode="json")
+    ratios = {
+        name.removeprefix("greedy_ratio_"): value for name, value in checkpoint.metadata["metrics"].items()
+    }
+    assert list(ratios) == sorted([*SOME, "drawn"])
+    assert all(0.0 <= ratio < 1.1 for ratio in ratios.values())

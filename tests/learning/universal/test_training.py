@@ -1,90 +1,132 @@
-"""Demonstrations and the training loop: reproducible from seeds, resumable at any update."""
+"""Fitting the policy for every size: what it learns, and that seeds decide everything, stopped or not."""
 
 from contextlib import suppress
 
 import numpy as np
 import pytest
 import torch
-from numba import typeof
-from referee import replay
 
-from app.domain.records import problem_to_record
-from app.learning.universal.episodes.policy import UniversalPolicy, initial
-from app.learning.universal.network.architecture import UniversalConfig
+from app.domain.plan import Plan
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.universal.training import trainer
-from app.learning.universal.training.curriculum import SHAPES, Shard, draw_shard
-from app.learning.universal.training.demonstrations import Series, demonstrate, read_shard, write_shard
-from app.learning.universal.training.trainer import Schedule, fit
-from app.simulation import visit
+from app.learning.universal.training.demonstrations import Demonstration, demonstrate, with_return
+from app.learning.universal.training.trainer import Material, Schedule, fit, trained, updates_done
 from app.simulation.arrays import compile_problem
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
-from app.simulation.replay import replay as replayed
 from app.solvers.greedy import greedy_plan
 
-SMALL = UniversalConfig(width=16, layers=1, qmix_hidden_dim=4)
+SMALL = PairwiseConfig(width=16, layers=1, qmix_hidden_dim=4)
 """Wide enough for both of the optimisers."""
-SERIES = Series("some", (4,), ("uniform", "scarce"))
+UPDATES = 24
+CPU = torch.device("cpu")
 
 
 @pytest.fixture(scope="module")
-def shards(tmp_path_factory):
-    """Two small files of demonstrations."""
-    folder = tmp_path_factory.mktemp("shards")
-    paths = []
-    for number in range(2):
-        rng = np.random.default_rng(number)
-        problems = [generate("uniform", 3, 5, 2, rng) for _ in range(5)]
-        shown = demonstrate(Shard(3, 5, problems, moves=2000), rng)
-        path = folder / f"{number}.npz"
-        np.savez(path, plans=shown.plans, rewards=shown.rewards, **shown.arrays._asdict())
-        paths.append(path)
-    return paths
+def shown():
+    """Searched plans of a few small problems of two sizes."""
+    rng = np.random.default_rng(1)
+    problems = [generate("uniform", *size, 2, rng) for size in [(3, 5), (6, 9)] * 4]
+    return [demonstrate(problem, 2000, rng) for problem in problems]
 
 
-def train(shards, state, updates):
-    """Train up to an update of a schedule of 40; stopped as a machine that goes down stops it."""
+def neighbours(rng):
+    """Every UAV has what one area needs, all areas another material; each visits its own, and the best plan
+    is to do so."""
+    m = 4
+    needs, places, own = np.eye(m), rng.random((m, 2)), rng.permutation(m)
+    problem = Problem(
+        uavs=tuple(
+            UAV(f"u{i}", *(2 * [0.5, 0.5]), 1.0, 4.0, tuple(needs[own[i]].tolist())) for i in range(m)
+        ),
+        targets=tuple(Target(f"a{j}", *places[j].tolist(), 5.0, tuple(needs[j].tolist())) for j in range(m)),
+        objective=Objective(distance_weight=0.1),
+        max_steps=3,
+    )
+    plan = Plan((tuple(own.tolist()),))
+    return Demonstration(problem, with_return(plan, problem), reward_of(problem, plan))
+
+
+def played(policy, each):
+    return policy.play(compile_problem(each.problem), np.zeros(1, np.int64)).rewards[0]
+
+
+def test_policy_learns_what_is_shown(tmp_path):
+    rng = np.random.default_rng(2)
+    shown, fresh = ([neighbours(rng) for _ in range(count)] for count in (30, 12))
+    policy = PairwisePolicy.of_seed(SMALL, 3)
+    before = [played(policy, each) for each in fresh]
+    told = []
+    fit(
+        policy,
+        shown,
+        Schedule(60, lr=2e-2, seed=5),
+        tmp_path / "state",
+        watch=lambda *said: told.append(said),
+    )
+    assert [update for update, _ in told] == list(range(1, 61))
+    assert told[-1][1]["imitation"] < 0.7 * told[0][1]["imitation"]
+    best = [each.reward for each in fresh]
+    assert [played(policy, each) for each in fresh] == pytest.approx(best)
+    assert np.mean(before) < 0.9 * np.mean(best), "nothing was to be learned"
+
+
+def train(shown, state, stopped=UPDATES, **part):
+    """Train by a schedule; stopped as a machine that goes down stops it."""
 
     class Down(Exception):
         pass
 
-    def watch(update, _means):
-        if update == updates and updates < 40:
+    def watch(update, _losses):
+        if update == stopped < UPDATES:
             raise Down
 
-    agent, mixer = initial(SMALL, 3)
     with suppress(Down):
-        fit(agent, mixer, shards, Schedule(40, seed=5), state, watch)
-    return agent, mixer
+        fit(PairwisePolicy.of_seed(SMALL, 3), shown, Schedule(UPDATES, seed=5), state, watch=watch, **part)
 
 
-def test_training_resumes_to_the_same_weights(shards, tmp_path, monkeypatch):
-    monkeypatch.setattr(trainer, "SAVE_EVERY", 10)
-    agent, mixer = train(shards, tmp_path / "whole.safetensors", 40)
-    for stopped in (7, 23, 36):
-        train(shards, tmp_path / "pieces.safetensors", stopped)
-    again, again_mixer = train(shards, tmp_path / "pieces.safetensors", 40)
-    for one, two in ((agent, again), (mixer, again_mixer)):
-        for a, b in zip(one.parameters(), two.parameters(), strict=True):
-            assert torch.equal(a, b)
-    policy = UniversalPolicy.of_training(tmp_path / "whole.safetensors", SMALL)
-    assert all(torch.equal(a, b) for a, b in zip(policy.agent.parameters(), agent.parameters(), strict=True))
+def test_training_resumes_to_the_same_bytes(shown, tmp_path, monkeypatch):
+    monkeypatch.setattr(trainer, "SAVE_EVERY", 5)
+    whole, pieces, first, second = (tmp_path / name for name in ("whole", "pieces", "first", "second"))
+    train(shown, whole)
+    for stopped in (3, 8, 19):
+        train(shown, pieces, stopped)
+        assert updates_done(pieces) == stopped // 5 * 5
+    train(shown, pieces)
+    train(shown, first, until=13)
+    assert updates_done(first) == 13
+    train(shown, second, before=first)
+    assert whole.read_bytes() == pieces.read_bytes() == second.read_bytes() != first.read_bytes()
 
 
-def test_training_changes_the_policy_and_lowers_the_losses(shards, tmp_path):
-    told = []
-    agent, mixer = initial(SMALL, 3)
-    start = [p.clone() for p in agent.parameters()]
-    fit(
-        agent,
-        mixer,
-        shards,
-        Schedule(60, lr=2e-2, seed=5),
-        tmp_path / "s",
-        lambda n, means: told.append(dict(means)),
+def test_policy_of_a_state_is_the_one_that_was_trained(shown, tmp_path):
+    policy = PairwisePolicy.of_seed(SMALL, 3)
+    fit(policy, shown, Schedule(6, seed=5), tmp_path / "state")
+    again = trained(tmp_path / "state", SMALL)
+    assert all(torch.equal(a, b) for a, b in zip(again.parameters(), policy.parameters(), strict=True))
+    untrained = PairwisePolicy.of_seed(SMALL, 3)
+    weights = zip(untrained.agent.layers.parameters(), again.agent.layers.parameters(), strict=True)
+    assert not any(torch.equal(a, b) for a, b in weights)
+
+
+def test_td_loss_is_learned_every_fourth_update_and_only_where_it_has_a_weight(shown):
+    material = Material(shown, CPU)
+    episodes = [material.of_update(Schedule(8), update)[1] for update in range(8)]
+    assert [each is not None for each in episodes] == 2 * [False, False, False, True]
+    assert material.of_update(Schedule(8, td_weight=0.0), 3)[1] is None
+
+
+def test_whole_episodes_are_of_small_problems_with_their_rewards(shown):
+    large = demonstrate(
+        generate("uniform", 14, 20, 2, np.random.default_rng(3)), 2000, np.random.default_rng(3)
     )
-    assert len(told) == 60
-    assert told[-1]["imitation"] < 0.9 * told[0]["imitation"]
-    assert not any(torch.equal(a, b) for a, b in zip(agent.parameters(), start, strict=True))
+    assert Material([large], CPU).decisions(np.random.default_rng(0)) is None
+    decisions = Material([large, *shown], CPU).decisions(np.random.default_rng(0))
+    assert decisions.batch.sight.uavs.shape[1] <= 6
+    shares = sorted(each.reward / sum(t.level for t in each.problem.targets if any(t.need)) for each in shown)
+    assert sorted(decisions.reward.sum(dim=1).tolist()) == pytest.approx(shares, abs=1e-5)
 
 
 def test_learning_rate_rises_and_falls():
@@ -99,69 +141,33 @@ def test_learning_rate_rises_and_falls():
     assert max(short) > 0.97
 
 
-def test_shard_is_decided_by_seed_and_number(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "app.learning.universal.training.demonstrations.draw_shard",
-        lambda rng, families: Shard(2, 4, [generate("uniform", 2, 4, 2, rng) for _ in range(3)], moves=500),
-    )
-    first, second = tmp_path / "a", tmp_path / "b"
-    for folder in (first, second):
-        folder.mkdir()
-    one, two = (read_shard(write_shard(folder, SERIES, 7, 1)) for folder in (first, second))
-    assert np.array_equal(one.plans, two.plans)
-    assert all(np.array_equal(a, b) for a, b in zip(one.arrays, two.arrays, strict=True))
-    # Of another type, all that is compiled would be compiled again.
-    assert typeof(one.arrays) == typeof(
-        compile_problem(generate("uniform", 2, 4, 2, np.random.default_rng(0)))
-    )
-    other = read_shard(write_shard(first, SERIES, 7, 2))
-    assert not np.array_equal(one.arrays.load, other.arrays.load)
-    path = write_shard(first, SERIES, 7, 1)
-    written = path.stat().st_mtime_ns
-    assert write_shard(first, SERIES, 7, 1).stat().st_mtime_ns == written
+def test_batch_has_problems_of_about_one_size(shown, monkeypatch):
+    # No more states than those of one size have.
+    monkeypatch.setattr(trainer, "BATCH_PAIRS", 150)
+    sizes = set()
+    for seed in range(6):
+        sight, action = Material(shown, CPU).batch(np.random.default_rng(seed))
+        sizes.add((sight.uavs.shape[1], sight.areas.shape[1]))
+        assert sight.present.all()
+        assert (action.amax(dim=1) >= 0).all()
+    assert sizes == {(3, 5), (6, 9)}
 
 
-def test_drawn_shards_have_the_listed_shapes():
-    rng = np.random.default_rng(9)
-    for _ in range(20):
-        shard = draw_shard(rng)
-        assert (shard.n_uavs, shard.n_targets) in [(m, n) for m, n, _ in SHAPES]
-        assert {(p.n_uavs, p.n_targets) for p in shard.problems} == {(shard.n_uavs, shard.n_targets)}
-        assert all(1 <= p.max_steps <= 7 for p in shard.problems)
+def test_of_a_large_problem_there_are_few_states():
+    problem = generate("uniform", 100, 300, 3, np.random.default_rng(4))
+    plan = greedy_plan(problem)
+    shown = Demonstration(problem, with_return(plan, problem), reward_of(problem, plan))
+    batch = Material([shown], CPU).batch(np.random.default_rng(0))
+    assert 1 <= len(batch.action) <= 2
 
 
-@pytest.mark.parametrize("agent", [None, initial(SMALL, 1)[0]], ids=["from greedy", "from a policy"])
-def test_demonstrations_are_legal_and_better_than_greedy(agent):
-    rng = np.random.default_rng(10)
-    problems = [generate("single_base", 5, 8, 2, rng) for _ in range(4)]
-    shown = demonstrate(Shard(5, 8, problems, moves=20_000), rng, agent)
-    gained = 0.0
-    for problem, plan, reward in zip(problems, shown.plans, shown.rewards, strict=True):
-        record = problem_to_record(problem)
-        assert replay(record, plan[: problem.max_steps].tolist())["reward"] == pytest.approx(reward)
-        greedy = replay(record, greedy_plan(problem).as_array().tolist())["reward"]
-        assert reward >= greedy - 1e-9
-        gained += reward - greedy
-    assert gained > 0.1
-
-
-def test_demonstrations_in_another_order_of_uavs_earn_the_same():
-    rng = np.random.default_rng(11)
-    problems = [generate("mixed_loads", 4, 9, 2, rng) for _ in range(6)]
-    shown = demonstrate(Shard(4, 9, problems, moves=20_000), rng)
-    arrays, plans = trainer._in_random_order(shown.arrays, shown.plans, rng)
-    again = replayed(arrays, plans, np.arange(6))
-    assert (again.rule == visit.ALLOWED).all()
-    assert np.abs(again.reward - shown.rewards).max() < 1e-9
-    assert not np.array_equal(plans, shown.plans)
-
-
-def test_of_large_episodes_some_uavs_are_learned_from(monkeypatch, shards):
-    monkeypatch.setattr(trainer, "TURN_TOKENS", 12)
-    _, batch, whole = trainer._demonstrated(shards, 0, 0, torch.device("cpu"))
-    assert not whole
-    assert len(batch.uav.unique()) == 1
-    monkeypatch.setattr(trainer, "TURN_TOKENS", 20_000)
-    _, batch, whole = trainer._demonstrated(shards, 0, 0, torch.device("cpu"))
-    assert whole
-    assert len(batch.uav.unique()) == 3
+def test_only_what_comes_after_the_first_step_is_learned(shown, monkeypatch):
+    each = max(shown, key=lambda each: len(each.plan))
+    last = len(each.plan) - 1
+    monkeypatch.setattr(trainer, "BATCH_PAIRS", 10_000)
+    rng = np.random.default_rng(0)
+    actions = Material([each._replace(first=last)], CPU).batch(rng).action
+    known = actions[actions >= 0]
+    assert (known == each.problem.n_targets).all(), "the last row sends everybody home"
+    everywhere = Material([each], CPU).batch(rng).action
+    assert ((everywhere >= 0) & (everywhere < each.problem.n_targets)).any()

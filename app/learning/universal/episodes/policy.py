@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import load_file
 from torch import nn
 
 from app.learning.universal.episodes.played import Played
@@ -18,9 +16,6 @@ from app.learning.universal.network.mixer import UniversalMixer
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
-
-_STATE_PREFIXES = {"networks.0.0.": "agent.", "networks.0.1.": "mixer."}
-"""Names in a training's state, and in a checkpoint."""
 
 
 class UniversalPolicy(nn.Module):
@@ -63,19 +58,6 @@ class UniversalPolicy(nn.Module):
     ) -> Played:
         """Play episodes; see :func:`~app.learning.universal.episodes.rollout.play`."""
         return play(self.agent, arrays, problem, rng, temperature, stop, spare, epsilon)
-
-    @classmethod
-    def of_training(cls, state: Path, config: UniversalConfig) -> UniversalPolicy:
-        """Take the networks out of a state that :func:`app.learning.universal.training.trainer.fit` wrote."""
-        policy, tensors = cls(config), load_file(state)
-        named = {
-            new + name.removeprefix(old): tensor
-            for old, new in _STATE_PREFIXES.items()
-            for name, tensor in tensors.items()
-            if name.startswith(old)
-        }
-        policy.load_state_dict(named, strict=True)
-        return policy
 
 
 def initial(config: UniversalConfig, seed: int) -> tuple[UniversalAgent, UniversalMixer]:

@@ -1,1 +1,1 @@
-"""How the shipped policies for every size are made: demonstrations, training, production."""
+"""How the policy for every size is made: demonstrations, corrections, training, production."""

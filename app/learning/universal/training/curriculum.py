@@ -1,14 +1,17 @@
-"""What the universal policy is trained on: every family, many sizes, variations of what dispatchers set."""
+"""What the policy for every size is trained on: problems of no family, and of every family, varied."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from app.domain.problem import Objective, Problem
+from app.simulation.drawn_generator import drawn, drawn_size
 from app.simulation.generator import FAMILIES, generate
+
+DRAWN_SHARE = 0.65
+"""Share of the problems that are of no family."""
 
 SHAPES: tuple[tuple[int, int, float], ...] = (
     (3, 3, 0.02),
@@ -28,51 +31,28 @@ SHAPES: tuple[tuple[int, int, float], ...] = (
     (50, 100, 0.01),
     (100, 300, 0.01),
 )
-"""M, N and how often."""
+"""M, N and how often, of the problems of families."""
 
 VARIED_SHARE = 0.35
-"""Probability of each variation."""
+"""Probability of each variation of a problem of a family."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shard:
-    """Problems of one M and N that are searched and stored together.
-
-    Attributes
-    ----------
-    n_uavs, n_targets
-        M and N.
-    problems
-        The problems; K may differ among them.
-    moves
-        Moves of the search for each demonstration.
-    """
-
-    n_uavs: int
-    n_targets: int
-    problems: Sequence[Problem]
-    moves: int
+def draw_problem(rng: np.random.Generator) -> Problem:
+    """Draw a problem, of no family or of any."""
+    problem = drawn(*drawn_size(rng), rng) if rng.random() < DRAWN_SHARE else _of_a_family(rng)
+    return with_greedy_unloading(problem)
 
 
-def draw_shard(rng: np.random.Generator, families: Sequence[str] = tuple(FAMILIES)) -> Shard:
-    """Draw a shard: a shape, then problems of random families, varied.
+def with_greedy_unloading(problem: Problem) -> Problem:
+    """Return a problem of which nothing is planned but where UAVs fly: that is what the policy decides."""
+    return replace(problem, objective=replace(problem.objective, unloading="greedy"))
 
-    Parameters
-    ----------
-    rng
-        The only source of randomness.
-    families
-        What to draw from.
-    """
+
+def _of_a_family(rng: np.random.Generator) -> Problem:
     shares = np.array([share for _, _, share in SHAPES])
     m, n, _ = SHAPES[rng.choice(len(SHAPES), p=shares / shares.sum())]
-    count = int(np.clip(64 * 300 / (m * n), 12, 64))
-    problems: list[Problem] = []
-    while len(problems) < count:
-        k = 3 if rng.random() < 0.6 else int(rng.integers(1, 7))
-        problem = generate(str(rng.choice(families)), m, n, k, rng)
-        problems.append(vary(problem, rng))
-    return Shard(m, n, problems, moves=int(np.clip(1000 * m * n, 100_000, 3_000_000)))
+    k = 3 if rng.random() < 0.6 else int(rng.integers(1, 7))
+    return vary(generate(str(rng.choice(list(FAMILIES))), m, n, k, rng), rng)
 
 
 def vary(problem: Problem, rng: np.random.Generator) -> Problem:

@@ -1,161 +1,144 @@
-"""Near-optimal plans of generated problems, by the compiled local search: what the policy learns from."""
+"""Plans of generated problems, by the compiled local search: what the policy learns from; and their files."""
 
 from __future__ import annotations
 
+import json
 import os
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from app.domain.plan import Actions, Plan
 from app.domain.problem import Problem
-from app.learning.universal.episodes.best_plan import BestPlan
-from app.learning.universal.episodes.effort import effort
-from app.learning.universal.episodes.rollout import play_in_orders
-from app.learning.universal.episodes.turn_order import some_orders
-from app.learning.universal.network.agent import UniversalAgent
-from app.learning.universal.training.curriculum import Shard, draw_shard
-from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
-from app.simulation.columns import AREAS, BASES, TERMS, UAVS
-from app.simulation.generator import FAMILIES
-from app.simulation.stacks import stack
-from app.solvers.greedy import greedy_plan
-from app.solvers.local_search.annealing import actions_of, anneal, new_search, set_routes
+from app.domain.records import problem_from_record, problem_to_record
+from app.learning.universal.training.curriculum import draw_problem
+from app.simulation.arrays import compile_problem
+from app.simulation.evaluation import reward_of
+from app.solvers.protocol import SolverContext
+from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.scale import largest_level
+from app.solvers.stop import never
+
+_NOTHING = 1e-9
+"""Reward, in largest levels, up to which a plan has earned nothing."""
 
 
-class Demonstrations(NamedTuple):
-    """P problems of one M and N with a plan each.
+class Demonstration(NamedTuple):
+    """A problem and a searched plan of it.
 
     Attributes
     ----------
-    arrays
-        The stack of problems.
-    plans
-        (P, S, M) joint actions; rows after a plan's end send everybody home.
-    rewards
-        (P,) their rewards, all above 0.
+    problem
+        With greedy unloading.
+    plan
+        (S', M) joint actions, with a row after the last visit that sends everybody home, if there is one.
+    reward
+        Of the plan, above 0.
+    first
+        Step, from 0, from which on its actions are worth imitating.
+    played
+        Of a correction, the reward of what the policy did.
     """
 
-    arrays: ProblemArrays
-    plans: Integers
-    rewards: Floats
+    problem: Problem
+    plan: Actions
+    reward: float
+    first: int = 0
+    played: float | None = None
+
+
+def moves_for(problem: Problem, search: float) -> int:
+    """Return the moves of a search: more for larger problems, and a share of these."""
+    moves = np.clip(600 * problem.n_uavs * problem.n_targets, 30_000, 600_000)
+    return max(1, round(search * float(moves)))
+
+
+def demonstrate(problem: Problem, moves: int, rng: np.random.Generator) -> Demonstration | None:
+    """Search a plan, from the greedy rule's or the problem's own; None where nothing can be earned."""
+    solver = create_solver(
+        "local_search", parse_parameters("local_search", {"moves": moves, "restarts": 0}), SolverContext()
+    )
+    plan = solver.solve(problem, int(rng.integers(2**31)), never, lambda _progress: None).plan
+    reward = reward_of(problem, plan)
+    if reward <= _NOTHING * largest_level(compile_problem(problem)):
+        return None
+    return Demonstration(problem, with_return(plan, problem), reward)
+
+
+def with_return(plan: Plan, problem: Problem) -> Actions:
+    """Return the actions of a plan, with a row that sends everybody home at the end, if there is a step."""
+    actions = Plan.of(plan.assignment, problem.n_targets).as_array()
+    if len(actions) == problem.max_steps:
+        return actions
+    return np.pad(actions, ((0, 1), (0, 0)), constant_values=problem.n_targets)
+
+
+Make = Callable[[Problem, np.random.Generator], Demonstration | None]
+"""Makes a demonstration of a problem, or finds that there is nothing to show."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Shards of one kind, numbered from 0.
+    """Files of demonstrations of one kind, numbered from 0.
 
     Attributes
     ----------
     name
-        Begins the names of their files.
+        Begins the names of the files.
     stream
         Tells their random numbers from those of other series.
-    families
-        Families of their problems.
-    search
-        Share of the moves of a full search that a plan is searched with.
+    size
+        Demonstrations a file.
     """
 
     name: str
-    stream: tuple[int, ...] = ()
-    families: tuple[str, ...] = tuple(FAMILIES)
-    search: float = 1.0
+    stream: tuple[int, ...]
+    size: int
+
+    def write(self, folder: Path, seed: int, number: int, make: Make) -> Path:
+        """Make one file, unless it is there.
+
+        Parameters
+        ----------
+        folder
+            Where the files are.
+        seed, number
+            They decide, with the stream, which problems it has and how they are searched.
+        make
+            Makes its demonstrations, of problems that are drawn until there are enough.
+        """
+        path = folder / f"{self.name}-{seed}-{number:05}.jsonl"
+        if not path.exists():
+            rng = np.random.default_rng([seed, number, *self.stream])
+            shown: list[Demonstration] = []
+            while len(shown) < self.size:
+                made = make(draw_problem(rng), rng)
+                if made is not None:
+                    shown.append(made)
+            write_demonstrations(path, shown)
+        return path
 
 
-def demonstrate(
-    shard: Shard, rng: np.random.Generator, agent: UniversalAgent | None = None
-) -> Demonstrations:
-    """Search a plan for each problem of a shard; problems in which nothing can be earned are left out.
-
-    Parameters
-    ----------
-    shard
-        At least one of its problems can be earned from.
-    rng
-        Source of the search's randomness.
-    agent
-        Policy from whose best greedy roll-out the search begins, cooler than from the greedy rule's plan: of
-        the many plans that are about as good it finds one that is near to what the policy would do.
-    """
-    steps = max(problem.max_steps for problem in shard.problems)
-    compiled, plans, rewards = [], [], []
-    for problem in shard.problems:
-        arrays = compile_problem(problem)
-        search = new_search(arrays)
-        if not len(search.near.active) or not len(search.near.wanted):
-            continue
-        start, heat = _start(problem, arrays, rng, agent)
-        set_routes(search, start)
-        scale = largest_level(arrays)
-        stream = np.random.Generator(np.random.SFC64(rng.integers(2**63)))
-        # All arguments: with one left out it would be compiled again.
-        anneal(search, stream, shard.moves, heat * scale, 0.001 * scale, 0.01 * scale, 0.0, 0.0, False)
-        if search.best[0] <= 1e-3 * scale:
-            continue
-        plan = np.full((steps, shard.n_uavs), shard.n_targets, np.int64)
-        plan[: problem.max_steps] = actions_of(search)
-        compiled.append(arrays)
-        plans.append(plan)
-        rewards.append(float(search.best[0]))
-    return Demonstrations(stack(compiled), np.stack(plans), np.array(rewards))
-
-
-def _start(
-    problem: Problem, arrays: ProblemArrays, rng: np.random.Generator, agent: UniversalAgent | None
-) -> tuple[Integers, float]:
-    """Plan that a search begins from, and its first temperature in largest levels."""
-    greedy = greedy_plan(problem).as_array()
-    if agent is None:
-        return greedy, 0.1
-    best = BestPlan(arrays)
-    best.consider(greedy[None])
-    best.consider(play_in_orders(agent, arrays, some_orders(effort(arrays).orders, problem.n_uavs, rng)))
-    return best.actions, 0.02
-
-
-def write_shard(
-    folder: Path, series: Series, seed: int, number: int, agent: UniversalAgent | None = None
-) -> Path:
-    """Make one shard of demonstrations, unless its file is there.
-
-    Parameters
-    ----------
-    folder
-        Where the files are.
-    series, seed, number
-        They decide which problems it has.
-    agent
-        As :func:`demonstrate` has it.
-    """
-    path = folder / f"{series.name}-{seed}-{number:05}.npz"
-    if not path.exists():
-        rng = np.random.default_rng([seed, number, *series.stream])
-        shard = draw_shard(rng, series.families)
-        shard = replace(shard, moves=round(series.search * shard.moves))
-        save_shard(path, demonstrate(shard, rng, agent))
-    return path
-
-
-def save_shard(path: Path, shown: Demonstrations) -> None:
-    """Write demonstrations so that the file is there whole or not at all."""
+def write_demonstrations(path: Path, shown: Sequence[Demonstration]) -> None:
+    """Write a JSON object a line, so that the file is there whole or not at all."""
     partial = path.with_suffix(".part")
-    with partial.open("wb") as file:
-        np.savez(file, plans=shown.plans, rewards=shown.rewards, **shown.arrays._asdict())
+    with partial.open("w", encoding="utf-8") as file:
+        for each in shown:
+            record = each._replace(plan=each.plan.tolist())._asdict()
+            record["problem"] = problem_to_record(each.problem)
+            file.write(json.dumps(record, allow_nan=False, separators=(",", ":")) + "\n")
     os.replace(partial, path)
 
 
-def read_shard(path: Path) -> Demonstrations:
-    """Read what :func:`write_shard` wrote."""
-    with np.load(path) as file:
-        arrays = ProblemArrays(**{name: file[name] for name in ProblemArrays._fields})
-        # A file does not say that its records are aligned; for others everything would be compiled again.
-        arrays = arrays._replace(
-            uavs=arrays.uavs.view(UAVS),
-            areas=arrays.areas.view(AREAS),
-            bases=arrays.bases.view(BASES),
-            terms=arrays.terms.view(TERMS),
-        )
-        return Demonstrations(arrays, file["plans"], file["rewards"])
+def read_demonstrations(path: Path) -> list[Demonstration]:
+    """Read what :func:`write_demonstrations` wrote."""
+    with path.open(encoding="utf-8") as file:
+        return [_read(json.loads(line)) for line in file]
+
+
+def _read(record: dict[str, Any]) -> Demonstration:
+    problem, plan = problem_from_record(record.pop("problem")), np.array(record.pop("plan"), np.int64)
+    return Demonstration(problem, plan, **record)

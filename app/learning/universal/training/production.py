@@ -1,10 +1,11 @@
-"""Making the library's policies for every size from nothing; every stage goes on where it stopped.
+"""Making the library's policy for every size from nothing; every stage goes on where it stopped.
 
-1. Near-optimal plans of generated problems are searched.
-2. A policy is fitted to them: the general policy.
-3. For each family plans of new problems are searched, beginning from what that policy does, and a copy of it
-   is fitted to those alone: a specialised policy.
-4. Each is measured on fresh problems of every family and written.
+1. Plans of generated problems are searched.
+2. A policy is fitted to them.
+3. It plays other problems up to some step, and the rest of each is searched: corrections.
+4. The fit goes on with both; 3 and 4 are repeated.
+5. The policy is measured on fresh problems of every family, and of none.
+6. It is written.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -24,20 +25,24 @@ import torch
 from pydantic import Field
 
 from app.domain.errors import InvalidCheckpoint
+from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.cluster_training import connected, on_cluster
-from app.learning.universal.episodes.policy import UniversalPolicy
-from app.learning.universal.episodes.rollout import play
-from app.learning.universal.network.architecture import UniversalConfig
-from app.learning.universal.training.curriculum import Shard
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.policy import PairwisePolicy
+from app.learning.universal.training.corrections import correct
+from app.learning.universal.training.curriculum import with_greedy_unloading
 from app.learning.universal.training.demonstrations import (
+    Demonstration,
     Series,
     demonstrate,
-    read_shard,
-    save_shard,
-    write_shard,
+    moves_for,
+    read_demonstrations,
+    write_demonstrations,
 )
-from app.learning.universal.training.trainer import Schedule, Watch, fit, unwatched
+from app.learning.universal.training.trainer import Schedule, fit, trained, updates_done
+from app.simulation.arrays import compile_problem
+from app.simulation.drawn_generator import drawn, drawn_size
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.protocol import Parameters
 
@@ -47,41 +52,54 @@ Tell = Callable[[str, float, str], None]
 """Takes a stage, the share of it that is done, and a word about it."""
 
 METRIC_SHAPE = (10, 20, 3)
-"""M, N and K of the fresh problems on which a policy is measured, and of the task it is filed under."""
+"""M, N and K of the fresh problems of families on which a policy is measured, and of the task it is filed
+under."""
 
 METRIC_MOVES = 400_000
 """Moves of the search whose plans the policy's are compared with."""
 
-_FRESH = 1_000_003
-"""Keeps the streams of the metrics' problems apart from those of the demonstrations."""
+DRAWN = "drawn"
+"""What problems of no family are called where families are listed."""
 
-SEARCHED = Series("demonstrations")
+CORRECTION_MOVES = 0.6
+"""Share of the moves of a full search that a correction is searched with: its beginning is known."""
 
-GENERAL = "every family, every size"
-"""Name of the general policy."""
+_CORRECTIONS, _FRESH = 1, 1_000_003
+"""Keep the streams of corrections, and of the metrics' problems, apart from that of searched plans."""
+
+NAME = "every family and none, every size"
+"""Name of the policy, for people."""
 
 
 class UniversalTrainingParameters(Parameters):
-    """What a training of policies for every size is made with."""
+    """What a training of the policy for every size is made with."""
 
-    shards: int = Field(default=260, ge=1, description="Files of searched plans, up to 64 problems each")
-    updates: int = Field(default=2800, ge=1, description="Steps of the optimiser on them")
-    lr: float = Field(default=1e-2, gt=0, description="Highest learning rate on them")
-    family_shards: int = Field(default=4, ge=1, description="Files of plans of one family")
-    family_updates: int = Field(default=150, ge=1, description="Steps of the optimiser on a family")
-    family_lr: float = Field(default=1e-3, gt=0, description="Highest learning rate on a family")
+    plans: int = Field(default=80, ge=1, description="Files of searched plans")
+    rounds: int = Field(default=3, ge=0, description="How often the policy is corrected")
+    corrections: int = Field(default=40, ge=1, description="Files of corrections a round")
+    size: int = Field(default=100, ge=1, description="Plans a file")
+    first_updates: int = Field(default=4000, ge=1, description="Steps of the optimiser before corrections")
+    round_updates: int = Field(default=6000, ge=1, description="Steps of the optimiser after each round's")
+    lr: float = Field(default=1e-2, gt=0, description="Highest learning rate")
     td_weight: float = Field(default=0.2, ge=0, description="Weight of the TD loss beside the cross-entropy")
     width: int = Field(default=64, ge=4, multiple_of=4, description="Width of a token")
-    layers: int = Field(default=2, ge=1, description="Attention layers")
+    layers: int = Field(default=3, ge=1, description="Attention layers")
     qmix_hidden_dim: int = Field(default=32, ge=1, description="Hidden units of the mixing network")
     metric_problems: int = Field(default=32, ge=1, description="Fresh problems a family to measure on")
     search: float = Field(default=1.0, gt=0, le=1, description="Share of a full search's moves for each plan")
     seed: int = Field(default=123, ge=0, description="Source of all randomness")
 
     @property
-    def config(self) -> UniversalConfig:
+    def config(self) -> PairwiseConfig:
         """Sizes of the networks."""
-        return UniversalConfig(self.width, self.layers, self.qmix_hidden_dim)
+        return PairwiseConfig(self.width, self.layers, self.qmix_hidden_dim)
+
+    @property
+    def schedule(self) -> Schedule:
+        """Of all fits together."""
+        return Schedule(
+            self.first_updates + self.rounds * self.round_updates, self.lr, self.td_weight, self.seed
+        )
 
 
 class _Processes(Protocol):
@@ -100,17 +118,18 @@ def _in_pool(
 
 @dataclass(frozen=True, slots=True)
 class Production:
-    """One making of policies.
+    """One making of a policy.
 
     Parameters
     ----------
     work
-        Folder of what the stages leave behind: demonstrations, and states of trainings. One for each set of
-        parameters.
+        Folder of what the stages leave behind: demonstrations, and states of the training. One for each set
+        of parameters.
     parameters
         What to make.
     workers
-        Processes, or threads, that work at the same time.
+        Processes, or threads, that work at the same time. With another number of threads sums are added up
+        in another order, so the last digits of the weights are others.
     tell
         Told about progress.
     cluster
@@ -124,30 +143,31 @@ class Production:
     tell: Tell
     cluster: str | None = None
 
-    def run(self, folder: Path, name: str) -> list[Path]:
-        """Make the policies and write them as checkpoints, the general one first.
+    def run(self, folder: Path, name: str) -> Path:
+        """Make the policy and write it as a checkpoint.
 
         Parameters
         ----------
         folder
             Where to; made where missing.
         name
-            Stem of the general policy's file, which becomes its id; a family's has the family behind it.
+            Stem of the file, which becomes the policy's id.
         """
         self.work.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         p = self.parameters
         # The same processes for all stages: each loads torch and compiled code before its first job.
         with self._processes() as processes:
-            searched = self._shards(processes, replace(SEARCHED, search=p.search), p.shards)
-            general = self._fit("general", searched, Schedule(p.updates, p.lr, p.td_weight, p.seed))
-            specialised = self._specialise(processes, general)
-            measured = self._measured(processes)
-        files = [self._write(folder / f"{name}.safetensors", general, GENERAL, tuple(FAMILIES), measured)]
-        for family, state in specialised.items():
-            file = folder / f"{name}-{family.replace('_', '-')}.safetensors"
-            files.append(self._write(file, state, f"{family}, every size", (family,), measured))
-        return files
+            plans = partial(_write_plans, self.work, p)
+            files = self._all(processes, "plans", plans, range(p.plans))
+            state = self._fit(0, files, None)
+            for number in range(1, p.rounds + 1):
+                corrections = partial(_write_corrections, self.work, p, state, number)
+                files += self._all(processes, f"corrections {number}", corrections, range(p.corrections))
+                state = self._fit(number, files, state)
+            kinds = (*FAMILIES, DRAWN)
+            fresh = self._all(processes, "fresh problems", partial(_write_fresh, self.work, p), kinds)
+        return self._write(folder / f"{name}.safetensors", state, dict(zip(kinds, fresh, strict=True)))
 
     @contextmanager
     def _processes(self) -> Iterator[_Processes]:
@@ -158,58 +178,45 @@ class Production:
             with ProcessPoolExecutor(self.workers, multiprocessing.get_context("spawn")) as pool:
                 yield partial(_in_pool, pool)
 
-    def _shards(self, processes: _Processes, series: Series, count: int) -> list[Path]:
-        job = partial(write_shard, self.work, series, self.parameters.seed)
-        return self._all(processes, series.name, job, range(count))
-
-    def _fit(self, stage: str, shards: list[Path], schedule: Schedule) -> Path:
-        """Fit in this process, with all threads; return the state."""
-        state = self.work / f"{stage}.safetensors"
-        before = torch.get_num_threads()
+    def _fit(self, number: int, files: list[Path], before: Path | None) -> Path:
+        """Do a part of the schedule in this process, with all threads; return the state."""
+        p, state = self.parameters, self.work / f"fit-{number}.safetensors"
+        until = p.first_updates + number * p.round_updates
+        if updates_done(state) == until:
+            return state
+        shown = [each for file in files for each in read_demonstrations(file)]
+        threads = torch.get_num_threads()
         torch.set_num_threads(self.workers)
         try:
-            watch = partial(self._watch, stage, schedule)
-            _fit(None, shards, schedule, state, self.parameters.config, watch)
+            watch = partial(self._watch, f"fit {number}", until)
+            policy = PairwisePolicy.of_seed(p.config, p.seed)
+            fit(policy, shown, p.schedule, state, until=until, before=before, watch=watch)
         finally:
-            torch.set_num_threads(before)
+            torch.set_num_threads(threads)
         return state
 
-    def _specialise(self, processes: _Processes, general: Path) -> dict[str, Path]:
-        """Fit a copy to each family, families side by side; return the states."""
-        job = partial(_specialise, self.work, self.parameters, general)
-        return dict(zip(FAMILIES, self._all(processes, "families", job, tuple(FAMILIES)), strict=True))
-
-    def _measured(self, processes: _Processes) -> dict[str, Path]:
-        """Search plans of the fresh problems on which policies are measured."""
-        job = partial(_write_measured, self.work, self.parameters)
-        files = self._all(processes, "fresh problems", job, tuple(FAMILIES))
-        return dict(zip(FAMILIES, files, strict=True))
-
-    def _write(
-        self, file: Path, state: Path, name: str, families: tuple[str, ...], measured: dict[str, Path]
-    ) -> Path:
-        p, policy = self.parameters, UniversalPolicy.of_training(state, self.parameters.config)
+    def _write(self, file: Path, state: Path, measured: dict[str, Path]) -> Path:
+        p, policy = self.parameters, trained(state, self.parameters.config)
         metrics: dict[str, float | int] = {
-            f"greedy_ratio_{family}": round(greedy_ratio(policy, path), 4)
-            for family, path in measured.items()
+            f"greedy_ratio_{kind}": round(greedy_ratio(policy, path), 4) for kind, path in measured.items()
         }
         data = encode(
             policy,
             config=policy.config,
-            task=generate(families[0], *METRIC_SHAPE, np.random.default_rng([p.seed, _FRESH])),
+            task=generate(next(iter(FAMILIES)), *METRIC_SHAPE, np.random.default_rng([p.seed, _FRESH])),
             algorithm="qmix",
             seed=p.seed,
             parameters=p,
             metrics=metrics,
-            name=name,
-            families=list(families),
+            name=NAME,
+            families=list(FAMILIES),
         )
         if data is None:
-            raise InvalidCheckpoint(f"the training of {name} has diverged")
+            raise InvalidCheckpoint("the training of the policy for every size has diverged")
         part = file.with_suffix(".part")
         part.write_bytes(data)
         os.replace(part, file)
-        self.tell("metrics", 1.0, name)
+        self.tell("metrics", 1.0, file.name)
         return file
 
     def _all(
@@ -222,50 +229,58 @@ class Production:
             self.tell(stage, len(results) / len(items), "")
         return [results[place] for place in range(len(items))]
 
-    def _watch(self, stage: str, schedule: Schedule, update: int, losses: dict[str, float]) -> None:
+    def _watch(self, stage: str, until: int, update: int, losses: dict[str, float]) -> None:
         words = ", ".join(f"{name} {loss:.4f}" for name, loss in losses.items())
-        self.tell(stage, update / schedule.updates, words)
+        self.tell(stage, update / until, words)
 
 
-def greedy_ratio(policy: UniversalPolicy, measured: Path) -> float:
-    """Mean share of a searched plan's reward that a greedy roll-out earns, on the problems of a shard."""
-    shown = read_shard(measured)
-    played = play(policy.agent, shown.arrays, np.arange(len(shown.rewards)))
-    return float(np.mean(played.rewards / shown.rewards))
+def greedy_ratio(policy: PairwisePolicy, measured: Path) -> float:
+    """Mean share of a searched plan's reward that one greedy roll-out earns, or staying at home: 0."""
+    ratios = []
+    for problem, _, reward, *_ in read_demonstrations(measured):
+        played = policy.play(compile_problem(problem), np.zeros(1, np.int64))
+        ratios.append(max(0.0, float(played.rewards[0])) / reward)
+    return float(np.mean(ratios))
 
 
-def _fit(
-    start: Path | None,
-    shards: list[Path],
-    schedule: Schedule,
-    state: Path,
-    config: UniversalConfig,
-    watch: Watch = unwatched,
-) -> None:
-    policy = UniversalPolicy.of_seed(config, schedule.seed)
-    if start is not None:
-        policy = UniversalPolicy.of_training(start, config)
-    fit(policy.agent, policy.mixer, shards, schedule, state, watch)
+def _write_plans(work: Path, parameters: UniversalTrainingParameters, number: int) -> Path:
+    p = parameters
+
+    def make(problem: Problem, rng: np.random.Generator) -> Demonstration | None:
+        return demonstrate(problem, moves_for(problem, p.search), rng)
+
+    return Series("plans", (), p.size).write(work, p.seed, number, make)
 
 
-def _specialise(work: Path, parameters: UniversalTrainingParameters, general: Path, family: str) -> Path:
-    """Make a family's demonstrations and fit a copy of the general policy to them, in one thread."""
+def _write_corrections(
+    work: Path, parameters: UniversalTrainingParameters, state: Path, number_of_round: int, number: int
+) -> Path:
     torch.set_num_threads(1)
-    p, state = parameters, work / f"family-{family}.safetensors"
-    agent = UniversalPolicy.of_training(general, p.config).agent
-    series = Series(f"demonstrations-{family}", (2, *family.encode()), (family,), p.search)
-    shards = [write_shard(work, series, p.seed, number, agent) for number in range(p.family_shards)]
-    schedule = Schedule(p.family_updates, p.family_lr, p.td_weight, p.seed)
-    _fit(general, shards, schedule, state, p.config)
-    return state
+    p, policy = parameters, trained(state, parameters.config)
+
+    def make(problem: Problem, rng: np.random.Generator) -> Demonstration | None:
+        return correct(problem, policy, moves_for(problem, p.search * CORRECTION_MOVES), rng)
+
+    series = Series(f"corrections-{number_of_round}", (_CORRECTIONS, number_of_round), p.size)
+    return series.write(work, p.seed, number, make)
 
 
-def _write_measured(work: Path, parameters: UniversalTrainingParameters, family: str) -> Path:
-    count = parameters.metric_problems
-    path = work / f"fresh-{family}-{count}.npz"
+def _write_fresh(work: Path, parameters: UniversalTrainingParameters, kind: str) -> Path:
+    """Search plans of the fresh problems of a family, or of none, on which the policy is measured."""
+    p = parameters
+    path = work / f"fresh-{kind}-{p.metric_problems}.jsonl"
     if not path.exists():
-        m, n, _ = METRIC_SHAPE
-        rng = np.random.default_rng([_FRESH, *family.encode()])
-        problems = [generate(family, *METRIC_SHAPE, rng) for _ in range(count)]
-        save_shard(path, demonstrate(Shard(m, n, problems, round(parameters.search * METRIC_MOVES)), rng))
+        rng = np.random.default_rng([_FRESH, *kind.encode()])
+        shown: list[Demonstration] = []
+        while len(shown) < p.metric_problems:
+            made = demonstrate(_fresh(kind, rng), round(p.search * METRIC_MOVES), rng)
+            if made is not None:
+                shown.append(made)
+        write_demonstrations(path, shown)
     return path
+
+
+def _fresh(kind: str, rng: np.random.Generator) -> Problem:
+    if kind != DRAWN:
+        return generate(kind, *METRIC_SHAPE, rng)
+    return with_greedy_unloading(drawn(*drawn_size(rng), rng))

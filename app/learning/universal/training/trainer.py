@@ -1,16 +1,15 @@
-"""Training the universal policy: demonstrations and own episodes in turn, resumable at any update.
+"""Fitting the policy for every size to demonstrations, resumable at any update.
 
-Which shard, which problems and which random numbers an update uses follows from the seed and the update's
-number alone, so a training that was stopped goes on as if it had not been.
+Which demonstrations and which states of them an update uses follows from the seed and the update's number
+alone, so a training that was stopped goes on as if it had not been.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import cast
 
@@ -19,37 +18,45 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from app.domain.problem import Problem
 from app.learning.compute.device import learning_device
-from app.learning.universal.episodes.rollout import play
-from app.learning.universal.episodes.turn_order import draw_orders, reorder, reorder_plans
-from app.learning.universal.episodes.turns import of_uavs, replay_turns
-from app.learning.universal.network.agent import UniversalAgent
-from app.learning.universal.network.mixer import UniversalMixer
-from app.learning.universal.training.demonstrations import Demonstrations, read_shard
-from app.learning.universal.updates.learner import Batch, Learner, make_batch
+from app.learning.pairwise.architecture import PairwiseConfig
+from app.learning.pairwise.learner import Batch, Decisions, Learner, make_batch, make_decisions
+from app.learning.pairwise.policy import PairwisePolicy
+from app.learning.pairwise.states import States, Turns, all_turns, some_states
+from app.learning.universal.training.demonstrations import Demonstration
 from app.learning.universal.updates.optimiser import muon
-from app.simulation.arrays import Integers, ProblemArrays
-from app.simulation.replay import replay
-from app.simulation.visit import ALLOWED
+from app.simulation.arrays import Integers, compile_problem
 
-TURN_TOKENS = 20_000
-"""Tokens an update sees, about: turns times targets."""
+BATCH_PAIRS = 20_000
+"""Pairs of a UAV and an area that an update imitates in, about."""
 
-MIN_SHARE = 0.4
-"""Where a single episode is longer than ``TURN_TOKENS`` by more than this share allows, only some of its UAVs
-are learned from, and without the TD loss, which needs all of them."""
+TOKEN_PAIRS = 6
+"""As many pairs cost what one UAV or area costs."""
 
-OWN_EVERY = 16
-"""Every so many updates the policy learns from its own episodes instead of demonstrations."""
+PROBLEMS = 8
+"""As many problems share a batch, at least, unless two states of each are more than fit in."""
+
+DECISION_PAIRS = 14_000
+"""Pairs in the whole episodes of an update with the TD loss, about."""
+
+SMALL = 260
+"""Pairs of a UAV and an area in problems whose whole episodes are learned from."""
 
 TD_EVERY = 4
-"""Every so many updates the TD loss is added; it needs the target networks' values, so it is not cheap."""
+"""Every so many updates the TD loss is added; whole episodes are not cheap."""
+
+UNLIKE = 0.2
+"""How much like sizes are mixed: largest random addition to the difference of two sizes, in logarithms."""
 
 WARM_UP = 200
 """Updates over which the learning rate rises, at most a tenth of all."""
 
 SAVE_EVERY = 200
 """Updates between two states on disk."""
+
+_STATE_PREFIXES = {"networks.0.0.": "agent.", "networks.0.1.": "mixer."}
+"""Names of the policy's weights in a training's state, and in the policy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +70,7 @@ class Schedule:
     lr
         Highest learning rate; it rises over some updates and falls as a half cosine to the end.
     td_weight
-        Weight of the loss of QMIX beside the cross-entropy.
+        Weight of the loss of QMIX beside the cross-entropy; no episodes are unfolded where it is 0.
     seed
         Source of all randomness.
     """
@@ -87,102 +94,150 @@ def unwatched(_update: int, _losses: dict[str, float]) -> None:
 
 
 def fit(
-    agent: UniversalAgent,
-    mixer: UniversalMixer,
-    shards: list[Path],
+    policy: PairwisePolicy,
+    shown: Sequence[Demonstration],
     schedule: Schedule,
     state: Path,
-    watch: Watch,
+    *,
+    until: int | None = None,
+    before: Path | None = None,
+    watch: Watch = unwatched,
 ) -> None:
-    """Train in place.
+    """Train in place, all of a schedule or a part of it.
 
     Parameters
     ----------
-    agent, mixer
-        As initialised; replaced by what `state` holds if that exists. They learn on a GPU where there is one,
-        and are on the processor before and afterwards.
-    shards
-        Files of demonstrations.
+    policy
+        As initialised; replaced by what `state` holds if that exists, or else by what `before` does. It
+        learns on a GPU where there is one, and is on the processor before and afterwards.
+    shown
+        What to learn from.
     schedule
         How long and how.
     state
         File that is written every ``SAVE_EVERY`` updates and at the end, and resumed from.
+    until
+        Number of the schedule's updates after which to end; all where None.
+    before
+        State of the part before, from which this one begins.
     watch
         Told the number of updates done and running means of the losses.
     """
-    device = learning_device()
-    agent.to(device)
-    mixer.to(device)
-    learner = Learner(agent, mixer, lr=schedule.lr, td_weight=schedule.td_weight, optimisers=muon)
-    done = _resume(learner, state) if state.exists() else 0
+    device, end = learning_device(), schedule.updates if until is None else until
+    policy.to(device)
+    learner = Learner(
+        policy.agent, policy.mixer, lr=schedule.lr, td_weight=schedule.td_weight, optimisers=muon
+    )
+    begin = state if state.exists() else before
+    done = 0 if begin is None else _resume(learner, begin)
+    material = Material(shown, device)
     means: dict[str, float] = {}
     with ThreadPoolExecutor(1) as ahead:
-        following = ahead.submit(_demonstrated, shards, schedule.seed, done, device)
-        for update in range(done, schedule.updates):
-            arrays, batch, whole = following.result()
-            demonstrated = not whole or update % OWN_EVERY != OWN_EVERY - 1
-            following = ahead.submit(_demonstrated, shards, schedule.seed, update + 1, device)
-            if not demonstrated:
-                batch = _own(agent, arrays, np.random.default_rng([schedule.seed, update, 1]), device)
-            losses = learner.update(
-                batch,
-                schedule.share_of_lr(update),
-                imitate=demonstrated,
-                bootstrap=whole and update % TD_EVERY == TD_EVERY - 1,
-            )
+        following = ahead.submit(material.of_update, schedule, done)
+        for update in range(done, end):
+            batch, decisions = following.result()
+            following = ahead.submit(material.of_update, schedule, update + 1)
+            losses = learner.update(schedule.share_of_lr(update), batch, decisions)
             for name, loss in losses.items():
                 means[name] = 0.98 * means.get(name, loss) + 0.02 * loss
-            if (update + 1) % SAVE_EVERY == 0 or update + 1 == schedule.updates:
+            if (update + 1) % SAVE_EVERY == 0 or update + 1 == end:
                 _save(learner, update + 1, state)
-            watch(update + 1, means)
-    agent.cpu()
-    mixer.cpu()
+            watch(update + 1, dict(means))
+    policy.cpu()
 
 
-@lru_cache(maxsize=256)
-def _read(path: Path) -> Demonstrations:
-    return read_shard(path)
+def trained(state: Path, config: PairwiseConfig) -> PairwisePolicy:
+    """Make a policy with the weights of a state that :func:`fit` wrote."""
+    policy, tensors = PairwisePolicy.of_seed(config, 0), load_file(state)
+    named = {
+        new + name.removeprefix(old): tensor
+        for old, new in _STATE_PREFIXES.items()
+        for name, tensor in tensors.items()
+        if name.startswith(old)
+    }
+    policy.load_state_dict(named, strict=True)
+    return policy
 
 
-def _demonstrated(
-    shards: list[Path], seed: int, update: int, device: torch.device
-) -> tuple[ProblemArrays, Batch, bool]:
-    """Some demonstrations of a shard, and whether all turns are there; of large episodes it is some UAVs'."""
-    rng = np.random.default_rng([seed, update, 0])
-    shown = _read(shards[rng.integers(len(shards))])
-    m, n, _ = shown.arrays.shape
-    count = min(len(shown.rewards), max(1, TURN_TOKENS // (2 * m * n)))
-    chosen = rng.choice(len(shown.rewards), count, replace=False)
-    arrays = ProblemArrays(**{name: column[chosen] for name, column in shown.arrays._asdict().items()})
-    arrays, plans = _in_random_order(arrays, shown.plans[chosen], rng)
-    turns = replay_turns(arrays, np.arange(count), plans)
-    share = TURN_TOKENS / (len(turns.action) * n)
-    whole = share > MIN_SHARE
-    if not whole:
-        turns = of_uavs(turns, rng.permutation(m)[: max(1, round(share * m))])
-    return arrays, make_batch(arrays, turns, device), whole
+def updates_done(state: Path) -> int:
+    """Return after how many updates a state was written; 0 where there is none."""
+    if not state.exists():
+        return 0
+    with safe_open(state, framework="pt") as file:
+        return int(file.metadata()["updates"])
 
 
-def _in_random_order(
-    arrays: ProblemArrays, plans: Integers, rng: np.random.Generator
-) -> tuple[ProblemArrays, Integers]:
-    """Let the UAVs act in random orders, but for plans that are only legal in the order they have.
+class Material:
+    """Demonstrations as batches; those of a batch are of about one size, since all are padded to the largest.
 
-    Two UAVs that are at one target in the same step unload in the order in which they act.
+    Parameters
+    ----------
+    shown
+        The demonstrations, at least one.
+    device
+        Where tensors go.
     """
-    count, _, m = plans.shape
-    orders = draw_orders(count, m, rng)
-    legal = replay(reorder(arrays, orders), reorder_plans(plans, orders), np.arange(count)).rule == ALLOWED
-    orders = np.where(legal[:, None], orders, np.arange(m))
-    return reorder(arrays, orders), reorder_plans(plans, orders)
+
+    def __init__(self, shown: Sequence[Demonstration], device: torch.device) -> None:
+        self._shown, self._device = shown, device
+        sizes = np.array([(p.n_uavs, p.n_targets, 1 + p.n_bases) for p in (each.problem for each in shown)])
+        self._sizes = np.log(sizes)
+        self._every = np.arange(len(shown))
+        self._small = np.flatnonzero(sizes[:, :2].prod(axis=1) < SMALL)
+
+    def of_update(self, schedule: Schedule, update: int) -> tuple[Batch, Decisions | None]:
+        """Return what an update learns from: states, and every now and then whole episodes."""
+        batch = self.batch(np.random.default_rng([schedule.seed, update, 0]))
+        if not schedule.td_weight or update % TD_EVERY != TD_EVERY - 1:
+            return batch, None
+        return batch, self.decisions(np.random.default_rng([schedule.seed, update, 1]))
+
+    def batch(self, rng: np.random.Generator) -> Batch:
+        """Draw states of problems of about one size."""
+        parts: list[States] = []
+        # Of a few small problems all states that were drawn may be without a choice.
+        while not parts:
+            parts = list(self._states(rng))
+        return make_batch(parts, self._device)
+
+    def _states(self, rng: np.random.Generator) -> Iterator[States]:
+        pairs = 0
+        for each in self._alike(rng, self._every):
+            one = _pairs(each.problem)
+            count = max(2, BATCH_PAIRS // PROBLEMS // one)
+            part = some_states(compile_problem(each.problem), each.plan, count, rng, each.first)
+            if len(part.action):
+                yield part
+                pairs += one * len(part.action)
+                if pairs >= BATCH_PAIRS:
+                    return
+
+    def decisions(self, rng: np.random.Generator) -> Decisions | None:
+        """Unfold whole episodes of small problems of about one size; None where all problems are large."""
+        parts: list[Turns] = []
+        pairs = 0
+        for each in self._alike(rng, self._small):
+            part = all_turns(compile_problem(each.problem), each.plan)
+            pairs += _pairs(each.problem) * len(part.step)
+            if pairs > DECISION_PAIRS and parts:
+                break
+            if len(part.step):
+                parts.append(part)
+        return make_decisions(parts, self._device) if parts else None
+
+    def _alike(self, rng: np.random.Generator, among: Integers) -> Iterator[Demonstration]:
+        """Yield demonstrations among some, those first that are most like one that is drawn."""
+        if not len(among):
+            return
+        apart = np.abs(self._sizes[among] - self._sizes[rng.choice(among)]).sum(axis=1)
+        for k in among[np.argsort(apart + UNLIKE * rng.random(len(among)), kind="stable")]:
+            yield self._shown[k]
 
 
-def _own(
-    agent: UniversalAgent, arrays: ProblemArrays, rng: np.random.Generator, device: torch.device
-) -> Batch:
-    problems = np.arange(len(arrays.max_steps))
-    played = play(agent, arrays, problems, rng)
-    return make_batch(arrays, replay_turns(arrays, problems, played.plans), device)
+def _pairs(problem: Problem) -> int:
+    """Return what a state costs, in pairs of a UAV and an area."""
+    m, places = problem.n_uavs, problem.n_targets + problem.n_bases
+    return m * places + TOKEN_PAIRS * (m + places)
 
 
 def _optimisers(learner: Learner) -> list[torch.optim.Optimizer]:
@@ -213,5 +268,4 @@ def _resume(learner: Learner, path: Path) -> int:
                 slots.setdefault(int(number), {})[slot] = tensor
         groups = optimiser.state_dict()["param_groups"]
         optimiser.load_state_dict({"state": slots, "param_groups": groups})
-    with safe_open(path, framework="pt") as file:
-        return int(file.metadata()["updates"])
+    return updates_done(path)

@@ -1,7 +1,7 @@
 """What steps the weights: Adam, or Muon on the matrices between hidden layers beside Adam on the rest.
 
 Muon (torch's, with the step sizes matched to Adam's) makes every direction of a matrix's step equally long.
-On demonstrations it gets further in the same number of updates, see README.md; on one problem, where a policy
+On demonstrations it gets further in the same number of updates, see LOG.md; on one problem, where a policy
 is only adjusted, Adam is kept.
 """
 
