@@ -54,9 +54,9 @@ def problems():
     for number in range(10):
         yield f"drawn {number}", drawn(3, 5, int(rng.integers(1, 4)), rng)
     yield "more areas than are near", drawn(2, 20, 2, rng)
-    for number in range(16):
-        yield f"world {number}", random_world(rng)
     for number in range(24):
+        yield f"world {number}", random_world(rng)
+    for number in range(40):
         yield f"sorties {number}", random_sorties(rng, 3, 5)
 
 
