@@ -4,15 +4,17 @@
 
 One size, 7 x 15 with K = 3, all families. Every variant is trained from random weights for ``--minutes`` of
 processor time (one thread), with the same demonstrations and the same schedule over that time, then plays
-fresh problems greedily, once each, in the order their UAVs have. Printed is the mean of reward over that of a
-search of 400,000 moves, ± the standard deviation over seeds.
+fresh problems greedily, once each. Printed is the mean of reward over that of a search of 400,000 moves, ±
+the standard deviation over seeds.
 
-- full: as ``python -m app train-universal`` learns, but for its random orders of UAVs and its later steps;
+- full: as ``python -m app train-universal`` learns, without corrections;
+- corrections: from half of the time on also from 512 of them, which it makes then, off the clock;
 - Adam: in place of Muon on the matrices, at the learning rate that suits it;
+- no TD loss: cross-entropy alone;
 - no demonstrations: own sampled episodes and the TD loss alone;
-- no turns: all UAVs of a step decide on the state at its beginning (``at_once.py``);
 - VDN: Q_tot is the sum of the agents' values;
-- no memory: a layer in place of the recurrent cell;
+- no bias: neither distances nor what is seen of a UAV and a place together count in the attention;
+- no pooling: what is seen of a UAV and a place together counts in no token;
 - paper: agent and mixing network of the paper for this one size, by the paper's observations, on the same
   demonstrations with the same two losses, target network copied every 100 updates.
 
@@ -29,6 +31,7 @@ import platform
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -40,69 +43,42 @@ from torch.nn import functional
 
 sys.path[:0] = [str(Path(__file__).parents[2])]
 
-from app.learning.universal.updates.learner import Learner, make_batch  # noqa: E402
-from at_once import play_at_once, replay_turns_at_once  # noqa: E402
-
+from app.learning.pairwise.architecture import PairwiseConfig  # noqa: E402
+from app.learning.pairwise.learner import Learner, make_decisions  # noqa: E402
+from app.learning.pairwise.policy import PairwisePolicy  # noqa: E402
+from app.learning.pairwise.states import all_turns  # noqa: E402
 from app.learning.paper.architecture import QmixConfig  # noqa: E402
 from app.learning.paper.environment import SwarmEnvironment  # noqa: E402
 from app.learning.paper.episode import Actor  # noqa: E402
 from app.learning.paper.learner import Learner as PaperLearner  # noqa: E402
 from app.learning.paper.networks import QmixNetwork  # noqa: E402
 from app.learning.paper.replay_buffer import Batch as PaperBatch  # noqa: E402
-from app.learning.universal.episodes.rollout import play  # noqa: E402
-from app.learning.universal.episodes.turns import replay_turns  # noqa: E402
-from app.learning.universal.network.agent import UniversalAgent  # noqa: E402
-from app.learning.universal.network.architecture import UniversalConfig  # noqa: E402
-from app.learning.universal.network.mixer import UniversalMixer  # noqa: E402
-from app.learning.universal.training.curriculum import Shard  # noqa: E402
-from app.learning.universal.training.demonstrations import demonstrate, read_shard  # noqa: E402
+from app.learning.universal.training.corrections import correct  # noqa: E402
+from app.learning.universal.training.demonstrations import (  # noqa: E402
+    demonstrate,
+    read_demonstrations,
+    write_demonstrations,
+)
+from app.learning.universal.training.trainer import Material, Schedule  # noqa: E402
 from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
-from app.simulation.arrays import ProblemArrays  # noqa: E402
+from app.simulation.arrays import compile_problem  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
 from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.greedy import greedy_plan  # noqa: E402
 
 M, N, K = 7, 15, 3
-LEARNED, TRIED = 1024, 64
+LEARNED, TRIED, CORRECTED = 1024, 64, 512
 MOVES = {LEARNED: 60_000, TRIED: 400_000}
-LR, MUON_LR, TD_WEIGHT, OWN_EVERY, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 16, 4, 30
-SHUT = -60.0
-"""Bias of a gate that lets nothing through."""
-
+LR, MUON_LR, TD_WEIGHT, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 4, 30
 EPISODES = 24
-"""An update of every variant."""
+"""Own episodes, and the paper's, in an update."""
 
-CONFIG = UniversalConfig()
-
-
-class Layer(nn.Module):
-    """In place of the recurrent cell: what was seen before is not remembered."""
-
-    def __init__(self, width):
-        super().__init__()
-        self.layer = nn.Linear(width, width)
-
-    def forward(self, seen):
-        return torch.tanh(self.layer(seen)), None
-
-    @property
-    def all_weights(self):
-        """The weights of a recurrent cell that forgets all there was: what is left is tanh of the layer."""
-        weight, bias = self.layer.weight, self.layer.bias
-        none, shut = torch.zeros_like(bias), torch.full_like(bias, SHUT)
-        weight_ih = torch.cat([torch.zeros_like(weight), torch.zeros_like(weight), weight])
-        bias_ih = torch.cat([none, shut, bias])
-        return [[weight_ih, torch.zeros_like(weight_ih), bias_ih, torch.zeros_like(bias_ih)]]
-
-
-class ForgetfulAgent(UniversalAgent):
-    def __init__(self, width, layers):
-        super().__init__(width, layers)
-        self.memory = Layer(width)
+CONFIG = PairwiseConfig(width=64, layers=3)
+CPU = torch.device("cpu")
 
 
 class Sum(nn.Module):
-    """VDN; over M, since rewards are too."""
+    """VDN; over M, as the mixer's is a mean."""
 
     def forward(self, values, hidden, present):
         return (values * present).sum(dim=1) / values.shape[1]
@@ -110,22 +86,25 @@ class Sum(nn.Module):
 
 @dataclass(frozen=True)
 class Variant:
-    """What differs from the full learner."""
+    """What differs from the full learner; parts of the agent by name are 0 and stay so."""
 
+    corrections: bool = False
     demonstrations: bool = True
-    turns: bool = True
+    td_weight: float = TD_WEIGHT
     mixer: bool = True
-    memory: bool = True
     muon: bool = True
+    without: tuple[str, ...] = ()
 
 
 VARIANTS = {
     "full": Variant(),
+    "corrections": Variant(corrections=True),
     "Adam": Variant(muon=False),
+    "no TD loss": Variant(td_weight=0.0),
     "no demonstrations": Variant(demonstrations=False),
-    "no turns": Variant(turns=False),
     "VDN": Variant(mixer=False),
-    "no memory": Variant(memory=False),
+    "no bias": Variant(without=("visit_bias", "reload_bias", "distance_bias")),
+    "no pooling": Variant(without=("uav_pool", "area_pool", "base_pool")),
 }
 PAPER = "paper"
 
@@ -143,14 +122,10 @@ def problems_of(count):
 
 def searched(folder, count):
     """Write a plan for each problem, unless the file is there; return where."""
-    path = folder / f"demonstrations-{count}.npz"
+    path = folder / f"demonstrations-{count}.jsonl"
     if not path.exists():
-        shard = Shard(M, N, problems_of(count), MOVES[count])
-        shown = demonstrate(shard, np.random.default_rng(count))
-        partial = path.with_suffix(".part")
-        with partial.open("wb") as file:
-            np.savez(file, plans=shown.plans, rewards=shown.rewards, **shown.arrays._asdict())
-        partial.rename(path)
+        rng = np.random.default_rng(count)
+        write_demonstrations(path, [demonstrate(each, MOVES[count], rng) for each in problems_of(count)])
     return path
 
 
@@ -159,6 +134,13 @@ class Clock:
 
     def __init__(self, seconds):
         self._seconds, self._start, self.updates = seconds, time.process_time(), 0
+
+    @contextmanager
+    def stopped(self):
+        """Count nothing meanwhile."""
+        begin = time.process_time()
+        yield
+        self._start += time.process_time() - begin
 
     @property
     def share(self):
@@ -170,26 +152,45 @@ class Clock:
 
 
 def train(name, seed, seconds, shown):
-    """Train a variant of the networks for every size; return the agent and the number of updates."""
+    """Train a variant of the networks for every size; return the policy and the number of updates."""
     variant = VARIANTS[name]
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        agent = (UniversalAgent if variant.memory else ForgetfulAgent)(CONFIG.width, CONFIG.layers)
-        mixer = UniversalMixer(CONFIG.width, CONFIG.qmix_hidden_dim) if variant.mixer else Sum()
+    policy = PairwisePolicy.of_seed(CONFIG, seed)
+    for part in variant.without:
+        for weights in getattr(policy.agent, part).parameters():
+            nn.init.zeros_(weights).requires_grad_(False)
     lr, optimisers = (MUON_LR, muon) if variant.muon else (LR, adam)
-    learner = Learner(agent, mixer, lr=lr, td_weight=TD_WEIGHT, optimisers=optimisers)
-    every, clock = np.arange(EPISODES), Clock(seconds)
+    mixer = policy.mixer if variant.mixer else Sum()
+    learner = Learner(policy.agent, mixer, lr=lr, td_weight=variant.td_weight, optimisers=optimisers)
+    schedule, material = Schedule(1, td_weight=variant.td_weight, seed=seed), Material(shown, CPU)
+    clock, corrected = Clock(seconds), not variant.corrections
     while clock.share < 1:
-        rng = np.random.default_rng([seed, clock.updates])
-        chosen = rng.choice(LEARNED, EPISODES, replace=False)
-        arrays = ProblemArrays(**{key: column[chosen] for key, column in shown.arrays._asdict().items()})
-        own = not variant.demonstrations or clock.updates % OWN_EVERY == OWN_EVERY - 1
-        roll_out, replay = (play, replay_turns) if variant.turns else (play_at_once, replay_turns_at_once)
-        plans = roll_out(agent, arrays, every, rng).plans if own else shown.plans[chosen]
-        bootstrap = not variant.demonstrations or clock.updates % TD_EVERY == TD_EVERY - 1
-        batch = make_batch(arrays, replay(arrays, every, plans), torch.device("cpu"))
-        learner.update(batch, clock.share_of_lr(), imitate=not own, bootstrap=bootstrap)
-    return agent, clock.updates
+        if clock.share > 0.5 and not corrected:
+            corrected = True
+            with clock.stopped():
+                material = Material(shown + corrections_of(policy, seed), CPU)
+        batch, decisions = None, None
+        if variant.demonstrations:
+            batch, decisions = material.of_update(schedule, clock.updates)
+        else:
+            decisions = own_episodes(policy, shown, np.random.default_rng([seed, clock.updates]))
+        learner.update(clock.share_of_lr(), batch, decisions)
+    return policy, clock.updates
+
+
+def corrections_of(policy, seed):
+    """Let a policy play fresh problems, and search what it should have done."""
+    rng = np.random.default_rng([seed, CORRECTED])
+    found = (correct(each, policy, MOVES[LEARNED], rng) for each in problems_of(CORRECTED))
+    return [each for each in found if each is not None]
+
+
+def own_episodes(policy, shown, rng):
+    """Sample episodes of some problems."""
+    parts = []
+    for k in rng.choice(LEARNED, EPISODES, replace=False):
+        arrays = compile_problem(shown[k].problem)
+        parts.append(all_turns(arrays, policy.play(arrays, np.zeros(1, np.int64), rng).plans[0]))
+    return make_decisions(parts, CPU)
 
 
 def train_paper(seed, seconds, shown):
@@ -223,32 +224,31 @@ def train_paper(seed, seconds, shown):
 
 def paper_episodes(shown):
     """All demonstrations as the paper's networks see them; rewards in largest levels and a UAV."""
-    problems, steps = problems_of(LEARNED), shown.plans.shape[1]
-    sizes = SwarmEnvironment(problems[0]).sizes
+    steps = max(len(each.plan) for each in shown)
+    sizes = SwarmEnvironment(shown[0].problem).sizes
     states = np.zeros((steps, LEARNED, sizes.state_features), np.float32)
     allowed = np.zeros((steps, LEARNED, M, N + 1), np.bool_)
     actions = np.full((steps, LEARNED, M), N, np.int64)
     rewards = np.zeros((steps, LEARNED), np.float32)
     terminated, filled = np.zeros((2, steps, LEARNED), np.bool_)
     draws = np.ones((M, 2))
-    for index, problem in enumerate(problems):
-        environment, level = SwarmEnvironment(problem), max(t.level for t in problem.targets)
+    for index, each in enumerate(shown):
+        environment, level = SwarmEnvironment(each.problem), max(t.level for t in each.problem.targets)
         environment.reset()
-        step = 0
-        while not environment.done:
+        for step, row in enumerate(each.plan):
+            if environment.done:
+                break
             environment.observe(states[step, index], allowed[step, index])
-            wanted = np.eye(N + 1, dtype=np.float32)[shown.plans[index, step]]
-            earned = environment.step(wanted, draws, 0.0, actions[step, index])
+            earned = environment.step(np.eye(N + 1, dtype=np.float32)[row], draws, 0.0, actions[step, index])
             rewards[step, index] = earned / level / M
             filled[step, index] = True
-            step += 1
-        terminated[step - 1, index] = True
+        terminated[int(filled[:, index].sum()) - 1, index] = True
     return PaperBatch(*map(torch.from_numpy, (states, allowed, actions, rewards, terminated, filled)))
 
 
 @lru_cache(maxsize=2)
 def read(path):
-    return read_shard(path)
+    return read_demonstrations(path)
 
 
 def run(name, seed, seconds, folder):
@@ -257,25 +257,14 @@ def run(name, seed, seconds, folder):
     shown, tried = (read(searched(folder, count)) for count in (LEARNED, TRIED))
     if name == PAPER:
         network, updates = train_paper(seed, seconds, shown)
-        problems = problems_of(TRIED)
-        rewards = np.array(
-            [Actor(SwarmEnvironment(each), network).play_greedily().reward for each in problems]
-        )
+        rewards = [Actor(SwarmEnvironment(each.problem), network).play_greedily().reward for each in tried]
     else:
-        if not VARIANTS[name].turns:
-            compile_at_once(tried)
-        agent, updates = train(name, seed, seconds, shown)
-        roll_out = play if VARIANTS[name].turns else play_at_once
-        rewards = roll_out(agent, tried.arrays, np.arange(TRIED)).rewards
-    ratios = rewards / tried.rewards
+        policy, updates = train(name, seed, seconds, shown)
+        rewards = [
+            policy.play(compile_problem(each.problem), np.zeros(1, np.int64)).rewards[0] for each in tried
+        ]
+    ratios = np.array(rewards) / [each.reward for each in tried]
     return {"ratio": float(ratios.mean()), "spread": float(ratios.std()), "updates": updates}
-
-
-def compile_at_once(tried):
-    """Compile what is not kept on disk, before the clock starts."""
-    few = ProblemArrays(**{key: column[:1] for key, column in tried.arrays._asdict().items()})
-    play_at_once(UniversalAgent(8, 1), few, np.zeros(1, np.int64))
-    replay_turns_at_once(few, np.zeros(1, np.int64), tried.plans[:1])
 
 
 def main():
@@ -313,7 +302,7 @@ def main():
 def table(done, options, seconds):
     """Lines of Markdown."""
     tried = read(searched(options.work, TRIED))
-    rule = [reward_of(each, greedy_plan(each)) for each in problems_of(TRIED)] / tried.rewards
+    rule = np.array([reward_of(each.problem, greedy_plan(each.problem)) / each.reward for each in tried])
     lines = [
         f"{platform.machine()}, torch {torch.__version__}, one thread: {options.minutes:g} min of processor "
         f"time each, {options.seeds} seeds, {LEARNED} demonstrations, {TRIED} fresh problems of {M} x {N}",
