@@ -8,7 +8,23 @@ from __future__ import annotations
 
 from typing import Any, Literal, NotRequired, TypedDict, final
 
-AlgorithmName = Literal["transfer_qmix", "qmix", "dqn", "ga", "local_search", "auto", "exact", "greedy"]
+AlgorithmName = Literal[
+    "transfer_qmix",
+    "qmix",
+    "dqn",
+    "ga",
+    "local_search",
+    "auto",
+    "exact",
+    "greedy",
+    "particle_swarm",
+    "grey_wolf",
+    "beetle_antennae",
+    "ant_colony",
+    "contract_net",
+    "bundles",
+    "semi_random_q",
+]
 
 
 @final
@@ -31,6 +47,9 @@ class Algorithm(TypedDict):
 
     learns: bool
     """Whether the library can hold what it learns."""
+
+    comparison: bool
+    """Whether it is there to be compared with: its plans may earn less than the greedy rule's."""
 
     unsupported: list[Unsupported]
     """Fields of a problem that it refuses with 422; it takes all others."""
