@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
@@ -236,7 +237,12 @@ class MissionService:
             "positions": seen,
             "proposal": None if proposal is None else proposal.content,
         }
-        after = await self._judge.ask("apply", payload)
+        try:
+            after = await self._judge.ask("apply", payload)
+        except ProposalClosed:
+            if proposal is not None:
+                await self._outdate(mission_id, proposal, at)
+            raise
         closes = None if proposal is None else (proposal.number, _CLOSES[body["type"]])
         judged = Judged(after["state"], after["plan"], after["effect"], after["wants_plan"], closes)
         sent = Sent(event_id, digest, body["type"], at, body)
@@ -246,6 +252,12 @@ class MissionService:
         if judged.wants_plan and new:
             self._planner.follow(head.mission.id, entry.number)
         return entry, new
+
+    async def _outdate(self, mission_id: str, proposal: Proposal, at: float) -> None:
+        """Look for another plan in place of one that fits no more: from now, and from where UAVs were seen."""
+        await self._judged(mission_id, events.Clock(), at, None, None)
+        await asyncio.to_thread(self.store.outdate, mission_id, proposal.number)
+        self._planner.follow(mission_id)
 
     def _require_sizes(self, head: Head, event: events.Event) -> None:
         """Refuse what would make the problem larger than is taken."""
@@ -278,13 +290,11 @@ class MissionService:
         return proposal
 
     async def _accept(self, mission_id: str) -> None:
-        """Let the open proposal of a mission take effect; one that fits no more is outdated."""
+        """Let the open proposal of a mission take effect, if it still fits."""
         for proposal in await asyncio.to_thread(self.store.proposals, mission_id):
             if proposal.status is ProposalStatus.OPEN:
-                try:
+                with contextlib.suppress(ProposalClosed):
                     await self.tell(mission_id, events.ProposalAccepted(proposal.number))
-                except ProposalClosed:
-                    await asyncio.to_thread(self.store.outdate, mission_id, proposal.number)
                 return
 
     async def delete(self, mission_id: str) -> None:

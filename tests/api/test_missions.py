@@ -254,6 +254,23 @@ def test_positions_count_with_the_next_event(begin):
     assert mission.get()["state"]["problem"]["uavs"][0]["x_c"] == 0.5
 
 
+def test_a_proposal_that_fits_no_more_is_outdated_and_another_plan_is_looked_for(begin):
+    mission = begin(problem=PLANNED)
+    mission.settle()
+    (proposal,) = mission.get("/proposals")["proposals"]
+    voyage = SMALL["uavs"][0]["voyage"]
+    mission.tell(
+        "telemetry", positions=[{"uav_id": "uav-1", "time": 0.2, "x": 0.1, "y": 0.1, "dis": 0.999 * voyage}]
+    )
+    refused = mission.send("proposal_accepted", proposal=proposal["number"])
+    assert (refused.status_code, refused.json()["type"]) == (409, "/docs/errors#proposal-closed")
+    assert mission.get("/proposals")["proposals"][-1]["status"] == "outdated"
+    settled = mission.settle()
+    assert settled["clock"] == 0.2
+    assert settled["state"]["problem"]["uavs"][0]["dis"] == pytest.approx(0.999 * voyage)
+    assert [event["type"] for event in mission.get("/events")["events"]][-1] in {"clock", "plan_proposed"}
+
+
 def test_positions_of_a_uav_that_is_new_are_taken(begin):
     mission = begin(problem=PLANNED)
     new = {**SMALL["uavs"][0], "id": "new"}
