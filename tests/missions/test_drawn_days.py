@@ -8,6 +8,7 @@ import pytest
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.missions.days.flying_a_day import Arm, fly_day
+from app.missions.days.futures import over_futures
 from app.missions.days.hindsight import in_hindsight
 from app.missions.days.insertion import insert
 from app.missions.days.kinds import APPEARING_UNTIL, FAILING, KINDS, Day, draw
@@ -16,6 +17,8 @@ from app.simulation.amounts import Amounts
 from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import replayed, reward_of
 from app.simulation.explain import timed_routes
+from app.solvers.protocol import SolverContext
+from app.solvers.registry import create_solver, parse_parameters
 
 
 def inserting(state, _number, _rng):
@@ -124,6 +127,16 @@ def test_a_day_follows_from_its_seed(kind):
     assert all(0.0 < at < APPEARING_UNTIL for at in first.appears.values())
     assert all(FAILING[0] <= at < FAILING[1] for at in first.lost.values())
     assert set(first.corrected) == {name for name, each in first.reports.items() if each != first.areas[name]}
+
+
+def test_a_plan_over_futures_is_of_what_is_known_and_follows_from_the_seeds():
+    greedy = create_solver("greedy", parse_parameters("greedy", {}), SolverContext())
+    drawn, arm = draw("reloads", 3), Arm(over_futures(greedy, 60.0, "reloads"), ticks=True)
+    flown = fly_day(drawn, arm, 1)
+    known = set(drawn.areas) | {base.id for base in drawn.problem.bases}
+    assert {each.stop.id for each in flown.done} <= known
+    assert flown.done == fly_day(drawn, arm, 1).done
+    assert flown.done != fly_day(drawn, arm, 2).done
 
 
 def test_insertion_puts_a_visit_where_its_way_is_shortest():
