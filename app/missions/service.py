@@ -254,7 +254,7 @@ class MissionService:
         return entry, new
 
     async def _outdate(self, mission_id: str, proposal: Proposal, at: float) -> None:
-        """Look for another plan in place of one that fits no more: from now, and from where UAVs were seen."""
+        """Look for another plan in place of one that fits no more, from where UAVs are now."""
         await self._judged(mission_id, events.Clock(), at, None, None)
         await asyncio.to_thread(self.store.outdate, mission_id, proposal.number)
         self._planner.follow(mission_id)
