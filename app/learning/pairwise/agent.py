@@ -25,7 +25,7 @@ from app.learning.pairwise.features import (
 
 
 class Sight(NamedTuple):
-    """T states as tensors: :class:`~app.learning.pairwise.observation.Seen`, padded, and distances.
+    """T states as tensors: :class:`~app.learning.pairwise.seen.Seen`, padded, and distances.
 
     Attributes
     ----------

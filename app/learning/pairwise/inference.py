@@ -11,41 +11,33 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from torch import Tensor, nn
 
 from app.learning.compute.kernels import (
     Float32s,
     add,
-    add_product,
     affine,
     copy,
     dot,
     gelu,
     kernel,
     normalise,
-    softmax,
+)
+from app.learning.compute.transformer import (
+    Affine,
+    Affines,
+    affine_of,
+    affines_of,
+    array_of,
+    attend,
+    feed_forward,
 )
 from app.learning.pairwise.agent import PairwiseAgent
 from app.learning.pairwise.architecture import HEADS
-from app.learning.pairwise.observation import Seen
+from app.learning.pairwise.seen import Seen
 from app.simulation.arrays import Integers
 from app.simulation.compilation import njit
 
 _ZERO = np.float32(0.0)
-
-
-class Affine(NamedTuple):
-    """A linear part: weight (I, J), transposed against PyTorch's, and bias (J,), 0 where it has none."""
-
-    weight: Float32s
-    bias: Float32s
-
-
-class Affines(NamedTuple):
-    """The same of L layers: (L, I, J) and (L, J). Of a norm: gains and shifts, both (L, J)."""
-
-    weight: Float32s
-    bias: Float32s
 
 
 class CompiledAgent(NamedTuple):
@@ -88,29 +80,13 @@ _LAYERS = ("attention_norm", "attention_in", "attention_out", "feed_norm", "feed
 
 def compile_agent(agent: PairwiseAgent) -> CompiledAgent:
     """Copy the weights of an agent, on whatever device it is."""
-    parts: dict[str, Any] = {name: _linear(getattr(agent, name)) for name in _LINEAR}
-    parts |= {name: _layers(agent, name) for name in _LAYERS}
+    parts: dict[str, Any] = {name: affine_of(getattr(agent, name)) for name in _LINEAR}
+    parts |= {name: affines_of(agent.layers, name) for name in _LAYERS}
     return CompiledAgent(
         **parts,
-        score_weight=_array(agent.score.weight[0]),
-        score_bias=_array(agent.score.bias),
+        score_weight=array_of(agent.score.weight[0]),
+        score_bias=array_of(agent.score.bias),
     )
-
-
-def _array(tensor: Tensor) -> Float32s:
-    return np.ascontiguousarray(tensor.detach().cpu().numpy())
-
-
-def _linear(part: nn.Module) -> Affine:
-    weight, bias = part.weight, part.bias
-    assert isinstance(weight, Tensor)
-    shift = np.zeros(len(weight), np.float32) if bias is None else _array(bias)  # type: ignore[arg-type]
-    return Affine(_array(weight.t()), shift)
-
-
-def _layers(agent: PairwiseAgent, name: str) -> Affines:
-    parts = [_linear(getattr(layer, name)) for layer in agent.layers]
-    return Affines(np.stack([part.weight for part in parts]), np.stack([part.bias for part in parts]))
 
 
 @torch.inference_mode()
@@ -157,14 +133,14 @@ def ask(agent: CompiledAgent, seen: Seen, biases: Float32s, problem: Integers, v
         key=np.empty((w // HEADS, a), np.float32),
         value=np.empty((a, w // HEADS), np.float32),
         share=np.empty((a, a), np.float32),
-        attended=np.empty((a, w // HEADS), np.float32),
+        seen=np.empty((a, w // HEADS), np.float32),
         pairs=np.empty((m * max(n, d), w), np.float32),
     )
     for t in range(len(problem)):
         _embed(agent, seen, t, biases[problem[t]], scratch)
         for layer in range(agent.feed_in.bias.shape[0]):
-            _attend(agent, layer, scratch)
-            _feed(agent, layer, scratch)
+            attend(agent, layer, scratch.bias[layer * HEADS : (layer + 1) * HEADS], scratch)
+            feed_forward(agent, layer, scratch)
         _score(agent, seen, t, scratch, values[t])
 
 
@@ -200,7 +176,7 @@ class Scratch(NamedTuple):
     key: Float32s
     value: Float32s
     share: Float32s
-    attended: Float32s
+    seen: Float32s
 
 
 @kernel
@@ -299,54 +275,6 @@ def _pool(edge: Float32s, pooled: Float32s) -> None:
     for c in range(half):
         pooled[c] += edge[c]
         pooled[half + c] = max(pooled[half + c], edge[c])
-
-
-@kernel
-def _attend(agent: CompiledAgent, layer: int, scratch: Scratch) -> None:
-    """Add to each token what it sees of the others."""
-    tokens, once, again, mixed = scratch.tokens, scratch.once, scratch.again, scratch.mixed
-    query, key, value, attended = scratch.query, scratch.key, scratch.value, scratch.attended
-    a, w = tokens.shape
-    size = w // HEADS
-    scale = np.float32(1.0) / np.sqrt(np.float32(size))
-    norm = agent.attention_norm
-    for token in range(a):
-        normalise(tokens[token], norm.weight[layer], norm.bias[layer], once[token])
-    affine(once, agent.attention_in.weight[layer], agent.attention_in.bias[layer], mixed)
-    for head in range(HEADS):
-        begin = head * size
-        for token in range(a):
-            for c in range(size):
-                query[token, c] = mixed[token, begin + c] * scale
-                key[c, token] = mixed[token, w + begin + c]
-                value[token, c] = mixed[token, 2 * w + begin + c]
-                attended[token, c] = _ZERO
-            copy(scratch.share[token], scratch.bias[layer * HEADS + head, token])
-        add_product(query, key, scratch.share)
-        for token in range(a):
-            softmax(scratch.share[token])
-        add_product(scratch.share, value, attended)
-        for token in range(a):
-            for c in range(size):
-                once[token, begin + c] = attended[token, c]
-    affine(once, agent.attention_out.weight[layer], agent.attention_out.bias[layer], again)
-    for token in range(a):
-        add(tokens[token], tokens[token], again[token])
-
-
-@kernel
-def _feed(agent: CompiledAgent, layer: int, scratch: Scratch) -> None:
-    """Add to each token what its feed-forward part makes of it."""
-    tokens, once, feed = scratch.tokens, scratch.once, scratch.feed
-    norm = agent.feed_norm
-    for token in range(tokens.shape[0]):
-        normalise(tokens[token], norm.weight[layer], norm.bias[layer], once[token])
-    affine(once, agent.feed_in.weight[layer], agent.feed_in.bias[layer], feed)
-    for token in range(tokens.shape[0]):
-        gelu(feed[token])
-    affine(feed, agent.feed_out.weight[layer], agent.feed_out.bias[layer], once)
-    for token in range(tokens.shape[0]):
-        add(tokens[token], tokens[token], once[token])
 
 
 @kernel

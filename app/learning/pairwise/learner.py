@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from app.learning.pairwise.agent import PairwiseAgent, Sight
-from app.learning.pairwise.observation import Seen
+from app.learning.pairwise.seen import Seen
 from app.learning.pairwise.states import UNKNOWN, States, Turns
 from app.learning.parameters import SERVICE_GRAD_NORM_CLIP
 from app.learning.universal.network.mixer import UniversalMixer

@@ -15,11 +15,9 @@ import numpy.typing as npt
 
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.agent import PairwiseAgent
-from app.learning.pairwise.inference import CompiledAgent, ask, compile_agent, place_bias
-from app.learning.pairwise.observation import (
+from app.learning.pairwise.gains import (
     FORBIDDEN,
     Gains,
-    Seen,
     begin_step,
     in_order,
     look,
@@ -27,9 +25,10 @@ from app.learning.pairwise.observation import (
     look_at,
     nearness,
     new_gains,
-    new_seen,
-    observe,
 )
+from app.learning.pairwise.inference import CompiledAgent, ask, compile_agent, place_bias
+from app.learning.pairwise.observation import observe
+from app.learning.pairwise.seen import Seen, new_seen
 from app.learning.universal.episodes.played import Played, acting_on_an_answer
 from app.learning.universal.network.parallel import helpers, parallel_threads
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays

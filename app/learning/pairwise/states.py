@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from app.learning.compute.kernels import Float32s
-from app.learning.pairwise.observation import (
+from app.learning.pairwise.gains import (
     FORBIDDEN,
     Gains,
-    Seen,
     begin_step,
     in_order,
     look,
@@ -18,10 +17,10 @@ from app.learning.pairwise.observation import (
     look_at,
     nearness,
     new_gains,
-    new_seen,
-    observe,
 )
+from app.learning.pairwise.observation import observe
 from app.learning.pairwise.rollout import send_idle
+from app.learning.pairwise.seen import Seen, new_seen
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled

@@ -15,9 +15,9 @@ from app.learning.pairwise.features import (
     VisitFeature,
 )
 from app.learning.pairwise.inference import ask, compile_agent, place_bias
-from app.learning.pairwise.observation import Seen
 from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.pairwise.rollout import _ask_together
+from app.learning.pairwise.seen import Seen
 
 
 def any_sight(rng: np.random.Generator, states: int, m: int, n: int, d: int) -> tuple[Seen, Float32s]:

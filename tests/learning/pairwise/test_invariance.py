@@ -8,8 +8,10 @@ import pytest
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.surroundings import Wind
 from app.learning.pairwise.features import VisitFeature
-from app.learning.pairwise.observation import begin_step, look, new_gains, new_seen, observe
+from app.learning.pairwise.gains import begin_step, look, new_gains
+from app.learning.pairwise.observation import observe
 from app.learning.pairwise.rollout import play
+from app.learning.pairwise.seen import new_seen
 from app.simulation.arrays import compile_problem
 from app.simulation.drawn_generator import drawn
 from app.simulation.generator import generate

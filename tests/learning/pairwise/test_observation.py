@@ -17,17 +17,9 @@ from app.learning.pairwise.features import (
     UavFeature,
     VisitFeature,
 )
-from app.learning.pairwise.observation import (
-    Seen,
-    begin_step,
-    in_order,
-    look,
-    look_again,
-    look_at,
-    new_gains,
-    new_seen,
-    observe,
-)
+from app.learning.pairwise.gains import begin_step, in_order, look, look_again, look_at, new_gains
+from app.learning.pairwise.observation import observe
+from app.learning.pairwise.seen import Seen, new_seen
 from app.simulation.arrays import compile_problem
 from app.simulation.drawn_generator import drawn
 from app.simulation.generator import FAMILIES, generate

@@ -11,19 +11,12 @@ from app.learning.checkpoints.checkpoint import encode
 from app.learning.checkpoints.export import to_onnx
 from app.learning.pairwise.architecture import QMIX_UNIVERSAL_2, UNIVERSAL_FEATURES_2, PairwiseConfig
 from app.learning.pairwise.features import UavFeature
-from app.learning.pairwise.observation import (
-    begin_step,
-    look,
-    look_again,
-    look_at,
-    nearness,
-    new_gains,
-    new_seen,
-    observe,
-)
+from app.learning.pairwise.gains import begin_step, look, look_again, look_at, nearness, new_gains
+from app.learning.pairwise.observation import observe
 from app.learning.pairwise.on_board import COLUMNS, PairwiseOnBoard
 from app.learning.pairwise.reference import PAGE, with_tables
 from app.learning.pairwise.rollout import play
+from app.learning.pairwise.seen import new_seen
 from app.learning.parameters import TransferQmixParameters
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate

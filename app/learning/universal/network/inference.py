@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from torch import Tensor, nn
 
 from app.learning.compute.kernels import (
     Float32s,
     add,
-    add_product,
     affine,
     candidate,
     copy,
@@ -27,7 +25,15 @@ from app.learning.compute.kernels import (
     kernel,
     normalise,
     sigmoid_of_sum,
-    softmax,
+)
+from app.learning.compute.transformer import (
+    Affine,
+    Affines,
+    affine_of,
+    affines_of,
+    array_of,
+    attend,
+    feed_forward,
 )
 from app.learning.universal.network.agent import UniversalAgent
 from app.learning.universal.network.architecture import HEADS
@@ -36,20 +42,6 @@ from app.simulation.arrays import Integers
 from app.simulation.compilation import njit
 
 _ZERO, _LEAST = np.float32(0.0), np.float32(-3e38)
-
-
-class Affine(NamedTuple):
-    """A linear part: weight (I, J), transposed against PyTorch's, and bias (J,)."""
-
-    weight: Float32s
-    bias: Float32s
-
-
-class Affines(NamedTuple):
-    """The same of L layers: (L, I, J) and (L, J). Of a norm: gains and shifts, both (L, J)."""
-
-    weight: Float32s
-    bias: Float32s
 
 
 class CompiledAgent(NamedTuple):
@@ -80,42 +72,26 @@ def compile_agent(agent: UniversalAgent) -> CompiledAgent:
     """Copy the weights of an agent, on whatever device it is."""
     weight_ih, weight_hh, bias_ih, bias_hh = agent.memory.all_weights[0]
     return CompiledAgent(
-        pair_in=_linear(agent.pair_in),
-        pair_hidden=_linear(agent.pair_hidden),
-        rival_in=_linear(agent.rival_in),
-        rival_out=_linear(agent.rival_out),
-        own_in=_linear(agent.own_in),
-        home=_array(agent.home),
-        attention_norm=_layers(agent, "attention_norm"),
-        attention_in=_layers(agent, "attention_in"),
-        attention_out=_layers(agent, "attention_out"),
-        feed_norm=_layers(agent, "feed_norm"),
-        feed_in=_layers(agent, "feed_in"),
-        feed_out=_layers(agent, "feed_out"),
-        norm=_linear(agent.norm),
-        memory_input=Affine(_array(weight_ih.t()), _array(bias_ih)),
-        memory_hidden=Affine(_array(weight_hh.t()), _array(bias_hh)),
-        token_head=_linear(agent.token_head),
-        memory_head=_linear(agent.memory_head),
-        score_weight=_array(agent.score.weight[0]),
-        score_bias=_array(agent.score.bias),
+        pair_in=affine_of(agent.pair_in),
+        pair_hidden=affine_of(agent.pair_hidden),
+        rival_in=affine_of(agent.rival_in),
+        rival_out=affine_of(agent.rival_out),
+        own_in=affine_of(agent.own_in),
+        home=array_of(agent.home),
+        attention_norm=affines_of(agent.layers, "attention_norm"),
+        attention_in=affines_of(agent.layers, "attention_in"),
+        attention_out=affines_of(agent.layers, "attention_out"),
+        feed_norm=affines_of(agent.layers, "feed_norm"),
+        feed_in=affines_of(agent.layers, "feed_in"),
+        feed_out=affines_of(agent.layers, "feed_out"),
+        norm=affine_of(agent.norm),
+        memory_input=Affine(array_of(weight_ih.t()), array_of(bias_ih)),
+        memory_hidden=Affine(array_of(weight_hh.t()), array_of(bias_hh)),
+        token_head=affine_of(agent.token_head),
+        memory_head=affine_of(agent.memory_head),
+        score_weight=array_of(agent.score.weight[0]),
+        score_bias=array_of(agent.score.bias),
     )
-
-
-def _array(tensor: Tensor) -> Float32s:
-    return np.ascontiguousarray(tensor.detach().cpu().numpy())
-
-
-def _linear(part: nn.Module) -> Affine:
-    weight, bias = part.weight, part.bias
-    assert isinstance(weight, Tensor)
-    assert isinstance(bias, Tensor)
-    return Affine(_array(weight.t()), _array(bias))
-
-
-def _layers(agent: UniversalAgent, name: str) -> Affines:
-    parts = [_linear(getattr(layer, name)) for layer in agent.layers]
-    return Affines(np.stack([part.weight for part in parts]), np.stack([part.bias for part in parts]))
 
 
 @torch.inference_mode()
@@ -248,8 +224,8 @@ def _encode(
     for token in range(n + 1):
         add(tokens[token], tokens[token], mine[0])
     for layer in range(agent.feed_in.bias.shape[0]):
-        _attend(agent, layer, bias[layer * HEADS : (layer + 1) * HEADS], scratch)
-        _feed(agent, layer, scratch)
+        attend(agent, layer, bias[layer * HEADS : (layer + 1) * HEADS], scratch)
+        feed_forward(agent, layer, scratch)
     for token in range(n + 1):
         normalise(tokens[token], agent.norm.weight, agent.norm.bias, once[token])
         copy(tokens[token], once[token])
@@ -279,54 +255,6 @@ def _pool(rival_in: Affine, rivals: Float32s, pooled: Float32s) -> None:
     share = np.float32(1.0) / np.float32(count)
     for c in range(half):
         mean[c] *= share
-
-
-@kernel
-def _attend(agent: CompiledAgent, layer: int, bias: Float32s, scratch: Scratch) -> None:
-    """Add to each token what it sees of the others."""
-    tokens, once, again, mixed = scratch.tokens, scratch.once, scratch.again, scratch.mixed
-    query, key, value, seen = scratch.query, scratch.key, scratch.value, scratch.seen
-    a, w = tokens.shape
-    size = w // HEADS
-    scale = np.float32(1.0) / np.sqrt(np.float32(size))
-    norm = agent.attention_norm
-    for token in range(a):
-        normalise(tokens[token], norm.weight[layer], norm.bias[layer], once[token])
-    affine(once, agent.attention_in.weight[layer], agent.attention_in.bias[layer], mixed)
-    for head in range(HEADS):
-        begin = head * size
-        for token in range(a):
-            for c in range(size):
-                query[token, c] = mixed[token, begin + c] * scale
-                key[c, token] = mixed[token, w + begin + c]
-                value[token, c] = mixed[token, 2 * w + begin + c]
-                seen[token, c] = _ZERO
-            copy(scratch.share[token], bias[head, token])
-        add_product(query, key, scratch.share)
-        for token in range(a):
-            softmax(scratch.share[token])
-        add_product(scratch.share, value, seen)
-        for token in range(a):
-            for c in range(size):
-                once[token, begin + c] = seen[token, c]
-    affine(once, agent.attention_out.weight[layer], agent.attention_out.bias[layer], again)
-    for token in range(a):
-        add(tokens[token], tokens[token], again[token])
-
-
-@kernel
-def _feed(agent: CompiledAgent, layer: int, scratch: Scratch) -> None:
-    """Add to each token what its feed-forward part makes of it."""
-    tokens, once, feed = scratch.tokens, scratch.once, scratch.feed
-    norm = agent.feed_norm
-    for token in range(tokens.shape[0]):
-        normalise(tokens[token], norm.weight[layer], norm.bias[layer], once[token])
-    affine(once, agent.feed_in.weight[layer], agent.feed_in.bias[layer], feed)
-    for token in range(tokens.shape[0]):
-        gelu(feed[token])
-    affine(feed, agent.feed_out.weight[layer], agent.feed_out.bias[layer], once)
-    for token in range(tokens.shape[0]):
-        add(tokens[token], tokens[token], once[token])
 
 
 @kernel
