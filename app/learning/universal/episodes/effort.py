@@ -18,7 +18,7 @@ _MOST_WORK = 6e7
 """Work of a greedy roll-out that is done without being asked for; some seconds."""
 
 _CHOOSING_WORK = 8e6
-"""Work of all greedy roll-outs together, of every policy that is tried, in every order of UAVs."""
+"""Work of all roll-outs at first sight together, of every policy that is tried."""
 
 _POLICIES = 3
 _ORDERS = 12
