@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from app.learning.pairwise.architecture import DISTANCE_FEATURES, HEADS, PairwiseConfig
+from app.learning.pairwise.architecture import PairwiseConfig
 from app.learning.pairwise.features import (
     AreaFeature,
     BaseFeature,
@@ -22,6 +22,8 @@ from app.learning.pairwise.features import (
     UavFeature,
     VisitFeature,
 )
+from app.learning.universal.network.agent import Layer, distance_features
+from app.learning.universal.network.architecture import DISTANCE_FEATURES, HEADS
 
 
 class Sight(NamedTuple):
@@ -44,28 +46,6 @@ class Sight(NamedTuple):
     reloads: Tensor
     distance: Tensor
     present: Tensor
-
-
-class Layer(nn.Module):
-    """Attention among tokens, then a feed-forward part; both with a residual."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.attention_norm = nn.LayerNorm(width)
-        self.attention_in = nn.Linear(width, 3 * width)
-        self.attention_out = nn.Linear(width, width)
-        self.feed_norm = nn.LayerNorm(width)
-        self.feed_in = nn.Linear(width, 2 * width)
-        self.feed_out = nn.Linear(2 * width, width)
-
-    def forward(self, tokens: Tensor, bias: Tensor) -> Tensor:
-        """Tokens (T, A, W) with attention logits raised by bias (T, H, A, A)."""
-        count, a, width = tokens.shape
-        mixed = self.attention_in(self.attention_norm(tokens)).view(count, a, 3, HEADS, width // HEADS)
-        query, key, value = mixed.permute(2, 0, 3, 1, 4)  # (T, H, A, W / H) each
-        seen = functional.scaled_dot_product_attention(query, key, value, attn_mask=bias)
-        tokens = tokens + self.attention_out(seen.transpose(1, 2).reshape(count, a, width))
-        return tokens + self.feed_out(functional.gelu(self.feed_in(self.feed_norm(tokens))))
 
 
 class PairwiseAgent(nn.Module):
@@ -133,17 +113,7 @@ class PairwiseAgent(nn.Module):
 
     def place_bias(self, distance: Tensor) -> Tensor:
         """Attention biases (T, L * H, N+D, N+D) between places at scaled distances (T, N+D, N+D)."""
-        near = torch.stack(
-            (
-                distance,
-                distance.square(),
-                torch.exp(-10 * distance),
-                torch.exp(-3 * distance),
-                (distance == 0).float(),
-            ),
-            dim=-1,
-        )
-        return self.distance_bias(near).permute(0, 3, 1, 2)
+        return self.distance_bias(distance_features(distance)).permute(0, 3, 1, 2)
 
     def bias(self, edges: Tensor, sight: Sight) -> Tensor:
         """Attention biases (T, L * H, M+N+D, M+N+D), from edges (T, M, N+D, 2 * L * H) and distances."""

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from app.learning.compute.kernels import Float32s
+from app.learning.universal.episodes.observation import FORBIDDEN, scales
 from app.simulation.arrays import NONE, Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
-from app.simulation.legs import UNREACHABLE
 from app.simulation.simulator import earned_now, leg_to, verdict
 from app.simulation.visit import ALLOWED
 from app.simulation.worth import cost_of
@@ -24,9 +24,6 @@ FOLLOW_UPS = 16
 
 FAR = 10.0
 """Spans that a leg is long at most; a leg that does not exist is that long."""
-
-FORBIDDEN = -np.inf
-"""Value of a visit that is not allowed."""
 
 
 class Gains(NamedTuple):
@@ -63,22 +60,6 @@ class Gains(NamedTuple):
     chosen: Integers
     first: Floats
     second: Floats
-
-
-def scales(arrays: ProblemArrays) -> tuple[Floats, Floats, Floats]:
-    """Return what distances, rewards and times are divided by, (P,) each; never 0."""
-    far = np.maximum(_longest(arrays.start_target), _longest(arrays.between))
-    span = np.maximum(np.maximum(far, _longest(arrays.home)), arrays.uavs["start_home"].max(axis=1))
-    span = np.where(span > 0, span, 1.0)
-    level = np.where(arrays.areas["need_total"] > 0, arrays.areas["level"], 0.0).max(axis=1)
-    flying = ~arrays.ret
-    speed = np.where(flying, arrays.uavs["speed"], 0.0).sum(axis=1) / np.maximum(flying.sum(axis=1), 1)
-    return span, np.where(level > 0, level, 1.0), span / np.where(speed > 0, speed, 1.0)
-
-
-def _longest(legs: Floats) -> Floats:
-    """Return the longest leg of each problem that there is, (P,)."""
-    return legs.max(axis=tuple(range(1, legs.ndim)), where=legs < UNREACHABLE, initial=0.0)
 
 
 def nearness(arrays: ProblemArrays, span: Floats) -> Float32s:

@@ -32,8 +32,8 @@ from app.learning.compute.transformer import (
     feed_forward,
 )
 from app.learning.pairwise.agent import PairwiseAgent
-from app.learning.pairwise.architecture import HEADS
 from app.learning.pairwise.seen import Seen
+from app.learning.universal.network.architecture import HEADS
 from app.simulation.arrays import Integers
 from app.simulation.compilation import njit
 

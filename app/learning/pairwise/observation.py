@@ -6,9 +6,10 @@ import numpy as np
 
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.features import AreaFeature, VisitFeature
-from app.learning.pairwise.gains import FAR, FORBIDDEN, Gains, best_two_of_each, in_order
-from app.learning.pairwise.seen import LONG, Seen, clip, share, squash
+from app.learning.pairwise.gains import FAR, Gains, best_two_of_each, in_order
+from app.learning.pairwise.seen import LONG, Seen, share
 from app.learning.pairwise.uav_observation import observe_bases, observe_reloads, observe_uavs
+from app.learning.universal.episodes.observation import FORBIDDEN, clip, squash
 from app.simulation.arrays import NONE, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled

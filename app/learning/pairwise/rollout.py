@@ -16,7 +16,6 @@ import numpy.typing as npt
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.agent import PairwiseAgent
 from app.learning.pairwise.gains import (
-    FORBIDDEN,
     Gains,
     begin_step,
     in_order,
@@ -29,6 +28,7 @@ from app.learning.pairwise.gains import (
 from app.learning.pairwise.inference import CompiledAgent, ask, compile_agent, place_bias
 from app.learning.pairwise.observation import observe
 from app.learning.pairwise.seen import Seen, new_seen
+from app.learning.universal.episodes.observation import FORBIDDEN
 from app.learning.universal.episodes.played import Played, acting_on_an_answer
 from app.learning.universal.network.parallel import helpers, parallel_threads
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays

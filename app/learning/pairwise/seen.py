@@ -53,18 +53,6 @@ def new_seen(states: int, arrays: ProblemArrays) -> Seen:
 
 
 @compiled
-def squash(x: float) -> float:
-    """Map any number into -1..1, nearly the same around 0."""
-    return x / (1.0 + abs(x))
-
-
-@compiled
-def clip(x: float, low: float, high: float) -> float:
-    """Bound a number."""
-    return min(max(x, low), high)
-
-
-@compiled
 def share(part: float, whole: float) -> float:
     """Return a part of a whole, at most 1; 0 of nothing."""
     return min(part / whole, 1.0) if whole > 0.0 else 0.0

@@ -8,7 +8,6 @@ import numpy as np
 
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.gains import (
-    FORBIDDEN,
     Gains,
     begin_step,
     in_order,
@@ -21,6 +20,7 @@ from app.learning.pairwise.gains import (
 from app.learning.pairwise.observation import observe
 from app.learning.pairwise.rollout import send_idle
 from app.learning.pairwise.seen import Seen, new_seen
+from app.learning.universal.episodes.observation import FORBIDDEN
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled

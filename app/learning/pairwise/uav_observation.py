@@ -6,8 +6,9 @@ import numpy as np
 
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.features import BaseFeature, ReloadFeature, UavFeature
-from app.learning.pairwise.gains import FAR, FORBIDDEN, Gains, in_order
-from app.learning.pairwise.seen import LONG, clip, share, squash
+from app.learning.pairwise.gains import FAR, Gains, in_order
+from app.learning.pairwise.seen import LONG, share
+from app.learning.universal.episodes.observation import FORBIDDEN, clip, squash
 from app.simulation.arrays import ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes

@@ -9,10 +9,11 @@ from worlds import random_sorties
 
 from app.domain.records import problem_to_record
 from app.learning.pairwise.features import ReloadFeature, UavFeature, VisitFeature
-from app.learning.pairwise.gains import nearness, scales
+from app.learning.pairwise.gains import nearness
 from app.learning.pairwise.learner import allowed, make_batch
 from app.learning.pairwise.rollout import play
 from app.learning.pairwise.states import UNKNOWN, all_turns, some_states
+from app.learning.universal.episodes.observation import scales
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 

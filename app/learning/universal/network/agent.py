@@ -73,17 +73,9 @@ class UniversalAgent(nn.Module):
 
     def bias(self, distance: Tensor) -> Tensor:
         """Attention biases (P, L * H, N+1, N+1) of problems with scaled distances (P, N, N)."""
-        near = torch.stack(
-            (
-                distance,
-                distance.square(),
-                torch.exp(-10 * distance),
-                torch.exp(-3 * distance),
-                (distance == 0).float(),
-            ),
-            dim=-1,
+        return functional.pad(
+            self.distance_bias(distance_features(distance)).permute(0, 3, 1, 2), (0, 1, 0, 1)
         )
-        return functional.pad(self.distance_bias(near).permute(0, 3, 1, 2), (0, 1, 0, 1))
 
     def encode(self, pair: Tensor, own: Tensor, rivals: Tensor, bias: Tensor) -> Tensor:
         """Tokens (T, N+1, W) of turns: rows (T, N, F), (T, G), (T, N, M, R), biases (T, L * H, N+1, N+1)."""
@@ -111,3 +103,17 @@ class UniversalAgent(nn.Module):
     def logits(self, values: Tensor) -> Tensor:
         """Log-odds of the sampling policy: Q values times a learned sharpness."""
         return values * self.sharpness.exp()
+
+
+def distance_features(distance: Tensor) -> Tensor:
+    """What attention is told of distances (...), in spans: (..., DISTANCE_FEATURES)."""
+    return torch.stack(
+        (
+            distance,
+            distance.square(),
+            torch.exp(-10 * distance),
+            torch.exp(-3 * distance),
+            (distance == 0).float(),
+        ),
+        dim=-1,
+    )

@@ -58,44 +58,60 @@ def expected_tensors(config: UniversalConfig) -> dict[str, tuple[tuple[int, ...]
     width, mixer = config.width, config.qmix_hidden_dim
     half = width // 2
     shapes: dict[str, tuple[int, ...]] = {
-        **_linear("agent.pair_in", PAIR_FEATURES, width),
-        **_linear("agent.pair_hidden", width, width),
-        **_linear("agent.rival_in", RIVAL_FEATURES, half),
-        **_linear("agent.rival_out", width, width),
-        **_linear("agent.own_in", OWN_FEATURES, width),
+        **linear_shapes("agent.pair_in", PAIR_FEATURES, width),
+        **linear_shapes("agent.pair_hidden", width, width),
+        **linear_shapes("agent.rival_in", RIVAL_FEATURES, half),
+        **linear_shapes("agent.rival_out", width, width),
+        **linear_shapes("agent.own_in", OWN_FEATURES, width),
         "agent.home": (width,),
         "agent.distance_bias.weight": (config.layers * HEADS, DISTANCE_FEATURES),
-        **_norm("agent.norm", width),
+        **norm_shapes("agent.norm", width),
         "agent.memory.weight_ih_l0": (3 * width, width),
         "agent.memory.weight_hh_l0": (3 * width, width),
         "agent.memory.bias_ih_l0": (3 * width,),
         "agent.memory.bias_hh_l0": (3 * width,),
-        **_linear("agent.token_head", width, width),
-        **_linear("agent.memory_head", width, width),
-        **_linear("agent.score", width, 1),
+        **linear_shapes("agent.token_head", width, width),
+        **linear_shapes("agent.memory_head", width, width),
+        **linear_shapes("agent.score", width, 1),
         "agent.sharpness": (),
-        **_linear("mixer.agent_weight", 2 * width, mixer),
-        **_linear("mixer.hidden_bias", width, mixer),
-        **_linear("mixer.out_weight", width, mixer),
-        **_linear("mixer.out_bias.0", width, mixer),
-        **_linear("mixer.out_bias.2", mixer, 1),
+        **mixer_shapes(width, mixer),
     }
-    for layer in range(config.layers):
-        name = f"agent.layers.{layer}"
-        shapes |= {
-            **_norm(f"{name}.attention_norm", width),
-            **_linear(f"{name}.attention_in", width, 3 * width),
-            **_linear(f"{name}.attention_out", width, width),
-            **_norm(f"{name}.feed_norm", width),
-            **_linear(f"{name}.feed_in", width, 2 * width),
-            **_linear(f"{name}.feed_out", 2 * width, width),
-        }
+    shapes |= layer_shapes(config.layers, width)
     return {name: (shape, "F32") for name, shape in shapes.items()}
 
 
-def _linear(name: str, inputs: int, outputs: int) -> dict[str, tuple[int, ...]]:
+def layer_shapes(layers: int, width: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the layers of attention."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for layer in range(layers):
+        name = f"agent.layers.{layer}"
+        shapes |= {
+            **norm_shapes(f"{name}.attention_norm", width),
+            **linear_shapes(f"{name}.attention_in", width, 3 * width),
+            **linear_shapes(f"{name}.attention_out", width, width),
+            **norm_shapes(f"{name}.feed_norm", width),
+            **linear_shapes(f"{name}.feed_in", width, 2 * width),
+            **linear_shapes(f"{name}.feed_out", 2 * width, width),
+        }
+    return shapes
+
+
+def mixer_shapes(width: int, mixer: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the mixing network."""
+    return {
+        **linear_shapes("mixer.agent_weight", 2 * width, mixer),
+        **linear_shapes("mixer.hidden_bias", width, mixer),
+        **linear_shapes("mixer.out_weight", width, mixer),
+        **linear_shapes("mixer.out_bias.0", width, mixer),
+        **linear_shapes("mixer.out_bias.2", mixer, 1),
+    }
+
+
+def linear_shapes(name: str, inputs: int, outputs: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of a linear part."""
     return {f"{name}.weight": (outputs, inputs), f"{name}.bias": (outputs,)}
 
 
-def _norm(name: str, width: int) -> dict[str, tuple[int, ...]]:
+def norm_shapes(name: str, width: int) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of a norm."""
     return {f"{name}.weight": (width,), f"{name}.bias": (width,)}

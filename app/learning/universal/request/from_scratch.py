@@ -10,11 +10,12 @@ import numpy as np
 
 from app.domain.problem import Problem
 from app.learning.checkpoints.checkpoint import encode, has_finite_weights
-from app.learning.pairwise.architecture import HEADS, WIDEST, PairwiseConfig
+from app.learning.pairwise.architecture import WIDEST, PairwiseConfig
 from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import LEARNING_RATE, QmixParameters
 from app.learning.universal.episodes.best_plan import BestPlan
 from app.learning.universal.episodes.temperature import Temperature
+from app.learning.universal.network.architecture import HEADS
 from app.learning.universal.request.fine_tuning import TURN_TOKENS, FineTuning
 from app.learning.universal.request.recombination import Recombination
 from app.simulation.arrays import ProblemArrays, compile_problem
