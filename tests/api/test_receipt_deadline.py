@@ -121,7 +121,7 @@ def test_what_is_not_received_in_time_is_closed(address, begun, status):
         assert b"application/problem+json" in head
         assert b"connection: close" in head.lower()
         assert b"x-request-id" in head.lower()
-        assert b'"type":"request-timeout"' in body
+        assert b'"type":"/docs/errors#request-timeout"' in body
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_what_is_no_http_gets_problem_details(address, garbage):
         received, _ = until_closed(connection)
     assert received.startswith(b"HTTP/1.1 400 ")
     assert b"application/problem+json" in received
-    assert b'"type":"bad-request"' in received
+    assert b'"type":"/docs/errors#bad-request"' in received
 
 
 def test_what_is_refused_unread_is_logged_with_the_id_of_its_answer():

@@ -1,5 +1,6 @@
 """The algorithm a dispatcher should take: where it asks the policy, and that it never does worse for it."""
 
+import math
 import subprocess
 import sys
 
@@ -44,7 +45,7 @@ def test_without_a_library_a_policy_is_not_needed():
 def test_a_short_time_limit_and_a_very_large_problem_are_the_searchs_alone():
     small = compile_problem(problem_of(5, 10))
     assert not policy_pays(small, 0.25)
-    assert not policy_pays(compile_problem(problem_of(150, 400)), None)
+    assert not policy_pays(compile_problem(problem_of(300, 700)), math.inf)
 
 
 @pytest.mark.parametrize("policy", ["", ", policy=False"])
