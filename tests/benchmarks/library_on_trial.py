@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.learning.universal.network.architecture import QMIX_UNIVERSAL_1
+from app.learning.paper.architecture import QMIX_PAPER_1
 from app.library.seeding import add_policies, read_policies, shipped_policies
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
@@ -17,7 +17,7 @@ from policy_store.policy import NewPolicy
 def policies_for_every_size(folder: Path | None) -> list[NewPolicy]:
     """Read them from a folder of checkpoints; the shipped ones where it is None."""
     found = shipped_policies() if folder is None else read_policies(folder)
-    chosen = [policy for policy in found if policy.architecture == QMIX_UNIVERSAL_1]
+    chosen = [policy for policy in found if policy.architecture != QMIX_PAPER_1]
     if not chosen:
         raise SystemExit(f"no policy for every size in {folder or 'the shipped library'}")
     return chosen
