@@ -4,6 +4,7 @@ import json
 import math
 import re
 import threading
+import time
 
 import httpx
 import pytest
@@ -13,6 +14,8 @@ from playwright.sync_api import expect
 from referee import replay
 
 from app.api.openapi_examples import example_problem
+
+WITHIN_S = 10
 
 AREA = {"level": 1, "loadlist": [3], "service_time": 0.5}
 UAV = {"x_s": 0, "y_s": 0, "speed": 2, "voyage": 60, "loadlist": [6], "full_load": [6]}
@@ -497,8 +500,8 @@ def test_what_comes_all_the_time_has_one_line_in_the_history(page, service):
     mission = Mission(service).search_ends().open(page)
     for n in range(3):
         mission.tell(f"tick-{n}", type="clock", at=0.1 * n)
-    for n, time in enumerate((0.25, 0.3)):
-        seen = [{"uav_id": "u1", "time": time, "x": 2 * time, "y": 0}]
+    for n, moment in enumerate((0.25, 0.3)):
+        seen = [{"uav_id": "u1", "time": moment, "x": 2 * moment, "y": 0}]
         mission.tell(f"seen-{n}", type="telemetry", positions=seen)
     mission.tell("tock", type="clock", at=0.5)
     lines = page.locator("[data-testid=mission-log] li")
@@ -643,11 +646,14 @@ def test_two_dispatchers_fly_a_whole_day(browser, service):
     def both_have_the_same():
         for page in pages:
             at_the_newest(page, mission)
-        tables = [
-            [page.get_by_test_id(f"mission-{name}").inner_text() for name in ("UAVs", "stops ahead")]
-            for page in pages
-        ]
-        assert tables[0] == tables[1]
+        # Tables are drawn a frame after the state has come.
+        end = time.monotonic() + WITHIN_S
+        while (tables := [shown(page) for page in pages])[0] != tables[1]:
+            assert time.monotonic() < end, tables
+            first.wait_for_timeout(20)
+
+    def shown(page):
+        return [page.get_by_test_id(f"mission-{name}").inner_text() for name in ("UAVs", "stops ahead")]
 
     accept(first)
     both_have_the_same()
