@@ -242,6 +242,8 @@ def _follow_up(
     best = around = 0.0
     for q in range(gains.near.shape[2]):
         then = gains.near[p, j, q]
+        if then == j:
+            continue
         unloaded = 0.0
         for k in range(episodes.load.shape[2]):
             load = episodes.load[b, i, k]

@@ -205,9 +205,6 @@ def test_order_of_uavs_does_not_matter_where_no_two_go_to_one_place(make_policy)
     assert moved > 25
 
 
-NEAR_ITSELF = "where another area needs nothing, or there is no other, an area may be among those near it"
-
-
 def of_areas(*needs: float) -> Problem:
     """One UAV with more than any area needs, and areas that need so much."""
     places = ((1, 0), (2, 1), (1, 1))
@@ -219,12 +216,10 @@ def of_areas(*needs: float) -> Problem:
     return Problem((uav,), targets, objective=Objective(distance_weight=0.1))
 
 
-@pytest.mark.xfail(reason=NEAR_ITSELF)
 def test_no_visit_follows_itself():
     assert sight(of_areas(2.0))[3][0, 0, VisitFeature.FOLLOW_UP] == 0.0
 
 
-@pytest.mark.xfail(reason=NEAR_ITSELF)
 def test_the_number_of_an_area_that_needs_nothing_changes_nothing():
     last = of_areas(2.0, 3.0, 0.0)
     first = replace(last, targets=(last.targets[2], *last.targets[:2]))

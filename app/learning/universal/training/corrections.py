@@ -31,7 +31,7 @@ def correct(
     Parameters
     ----------
     problem
-        What changes of a plan cost is 0.
+        Changes of its own plan cost nothing here: the plan to begin from is the policy's.
     policy
         Plays one episode.
     moves
@@ -45,6 +45,7 @@ def correct(
         The whole plan, worth imitating from the step on, or from where the search left the policy's plan
         before it. None where nothing can be earned.
     """
+    problem = replace(problem, start_plan=None, objective=replace(problem.objective, change_weight=0.0))
     arrays = compile_problem(problem)
     own = rng if rng.random() >= GREEDY_SHARE else None
     played = policy.play(arrays, np.zeros(1, np.int64), own, TEMPERATURE)

@@ -1,4 +1,7 @@
-"""What the policy for every size is trained on: problems of no family, and of every family, varied."""
+"""What the policy for every size is trained on: problems of no family, and of every family, varied.
+
+Some have a wind, zones, promises and whatever else is around a swarm, and some a plan to keep to.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,21 @@ import numpy as np
 
 from app.domain.problem import Objective, Problem
 from app.simulation.drawn_generator import drawn, drawn_size
+from app.simulation.drawn_surroundings import with_surroundings
 from app.simulation.generator import FAMILIES, generate
+from app.solvers.greedy import greedy_plan
 
 DRAWN_SHARE = 0.65
 """Share of the problems that are of no family."""
+
+SURROUNDED_SHARE = 0.3
+"""Share of all that get surroundings."""
+
+KEPT_SHARE = 0.1
+"""Share of all that get a plan from which changes cost reward."""
+
+KNOWN_BEFORE = 0.8
+"""Share of the areas for which that plan was made."""
 
 SHAPES: tuple[tuple[int, int, float], ...] = (
     (3, 3, 0.02),
@@ -40,7 +54,26 @@ VARIED_SHARE = 0.35
 def draw_problem(rng: np.random.Generator) -> Problem:
     """Draw a problem, of no family or of any."""
     problem = drawn(*drawn_size(rng), rng) if rng.random() < DRAWN_SHARE else _of_a_family(rng)
-    return with_greedy_unloading(problem)
+    problem = with_greedy_unloading(problem)
+    if rng.random() < SURROUNDED_SHARE:
+        problem = with_surroundings(problem, rng)
+    return _with_plan(problem, rng) if rng.random() < KEPT_SHARE else problem
+
+
+def _with_plan(problem: Problem, rng: np.random.Generator) -> Problem:
+    """Let changes cost reward, of a plan that was made before some of the areas needed anything."""
+    targets = tuple(
+        target if rng.random() < KNOWN_BEFORE else replace(target, loadlist=(0.0,) * len(target.loadlist))
+        for target in problem.targets
+    )
+    plan = greedy_plan(replace(problem, targets=targets))
+    worth = float(np.median([target.level for target in problem.targets]))
+    price = worth * float(np.exp(rng.uniform(np.log(0.01), np.log(1.0))))
+    return replace(
+        problem,
+        start_plan=plan.assignment or None,
+        objective=replace(problem.objective, change_weight=price),
+    )
 
 
 def with_greedy_unloading(problem: Problem) -> Problem:
