@@ -259,12 +259,12 @@ class TransferQmixParameters(_ModalParameters):
         ge=0,
         le=MAX_REPLANS,
         description="Sampled roll-outs of two to six UAVs in what the others of the best plan leave; null: "
-        "three for each of samples where fine-tuning or polish follows, else none",
+        "three for each of samples",
     )
     recombine: Annotated[bool | None, _SERVICE] = Field(
         default=None,
-        description="Whether routes of all episodes are put together to plans, UAV by UAV, where there are "
-        "no bases; null: true, but for a single roll-out",
+        description="Whether routes of all episodes are put together to plans, UAV by UAV; null: true, but "
+        "for a single roll-out",
     )
     n_epochs: int | None = Field(
         default=None,

@@ -10,6 +10,7 @@ from app.domain.geometry import distance
 from app.domain.matrices import Matrix
 from app.domain.problem import Problem
 from app.domain.surroundings import Base, Material, NoFlyZone, Wind
+from app.simulation.drawn_generator import drawn
 
 
 def random_world(rng: np.random.Generator, max_uavs: int = 4, max_targets: int = 6) -> Problem:
@@ -65,6 +66,18 @@ def random_sorties(rng: np.random.Generator, max_uavs: int = 4, max_targets: int
         for uav in problem.uavs
     )
     return replace(problem, uavs=uavs, bases=tuple(bases))
+
+
+def some_with_bases(count: int) -> list[Problem]:
+    """Drawn problems with bases, of several UAVs, whose unloading is greedy."""
+    found, number = [], 0
+    while len(found) < count:
+        problem = drawn(5, 12, 2, np.random.default_rng([17, number]))
+        if problem.bases:
+            objective = replace(problem.objective, unloading="greedy")
+            found.append(replace(problem, objective=objective))
+        number += 1
+    return found
 
 
 def random_loading(rng: np.random.Generator, max_uavs: int = 3, max_targets: int = 5) -> Problem:

@@ -76,8 +76,10 @@ class PairwiseOnBoard(nn.Module):
         home = torch.ones_like(uavs[:, :1], dtype=torch.bool)
         allowed = torch.cat((visits[:, :, 0] > 0, home, reloads[:, :, 0] > 0), dim=1)
         logits = self.agent.logits(values).masked_fill(~allowed, -torch.inf)
-        likely, choice = logits.log_softmax(dim=1).max(dim=1)
-        sureness = likely.masked_fill(uavs[:, UavFeature.ACTED] > 0, -torch.inf)
+        best, choice = logits.max(dim=1)
+        # From the odds of all else, so that no probability near 1 is rounded to it.
+        odds = (logits - best[:, None]).exp().scatter(1, choice[:, None], 0.0).sum(dim=1)
+        sureness = (-odds.log1p()).masked_fill(uavs[:, UavFeature.ACTED] > 0, -torch.inf)
         first = sureness.argmax(dim=0, keepdim=True)
         return values, logits, sureness, first, choice[first]
 

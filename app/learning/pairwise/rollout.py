@@ -86,7 +86,7 @@ def play(
     branch = list(range(batch)) if rng is None else problem.tolist()
     asked = np.empty(batch, np.int64)
     for s in range(steps):
-        _begin_steps(arrays, episodes, gains, plans[:, s], rewards)
+        _begin_steps(arrays, episodes, gains, plans, s, rewards)
         while (count := _open(episodes, gains, asked)) > 0:
             if stop():
                 _send_home(arrays, episodes, rewards)
@@ -106,17 +106,23 @@ def play(
                     logits = np.where(explores[:, :, None] & np.isfinite(logits), 0.0, logits)
                 noisy = logits / temperature + rng.gumbel(size=logits.shape)
             choice = noisy.argmax(axis=2)
-            sure = np.take_along_axis(logits, choice[:, :, None], axis=2)[:, :, 0]
-            sure -= logits.max(axis=2) + np.log(
-                np.exp(logits - logits.max(axis=2, keepdims=True)).sum(axis=2)
-            )
-            _commit(arrays, episodes, gains, who, choice, sure.astype(np.float64), plans[:, s], rewards)
+            sure = _log_probability(logits, choice)
+            _commit(arrays, episodes, gains, who, choice, sure, plans, s, rewards)
             if rng is not None:
                 _branch_out(branch, who, plans[:, s], gains.acted)
         _end_steps(arrays, episodes, gains, rewards)
         if episodes.done.all():
             break
     return Played(plans, rewards)
+
+
+def _log_probability(logits: Float32s, choice: Integers) -> Floats:
+    """Return that of each UAV's choice, (B, M), from the odds of all else: so none is rounded to 0."""
+    chosen = np.take_along_axis(logits, choice[:, :, None], axis=2)
+    with np.errstate(over="ignore"):
+        odds = np.exp((logits - chosen).astype(np.float64))
+    np.put_along_axis(odds, choice[:, :, None], 0.0, axis=2)
+    return np.asarray(-np.log1p(odds.sum(axis=2)))
 
 
 def _branch_out(branch: list[int], who: Integers, joint: Integers, acted: Flags) -> None:
@@ -157,13 +163,13 @@ def _close_empty(arrays: ProblemArrays, episodes: Episodes, rewards: Floats) -> 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _begin_steps(
-    arrays: ProblemArrays, episodes: Episodes, gains: Gains, joint: Integers, rewards: Floats
+    arrays: ProblemArrays, episodes: Episodes, gains: Gains, plans: Integers, s: int, rewards: Floats
 ) -> None:
     for b in range(episodes.done.shape[0]):
         if episodes.done[b]:
             continue
         begin_step(episodes, gains, b)
-        rewards[b] += send_idle(arrays, episodes, gains, b, joint[b])
+        rewards[b] += send_idle(arrays, episodes, gains, b, plans[b, s])
 
 
 @compiled
@@ -216,7 +222,8 @@ def _commit(
     who: Integers,
     choice: Integers,
     sure: Floats,
-    joint: Integers,
+    plans: Integers,
+    s: int,
     rewards: Floats,
 ) -> None:
     """Let the surest UAVs of each listed episode act."""
@@ -234,12 +241,12 @@ def _commit(
             a = choice[q, i]
             if gains.acted[b, i] or (taken[a] and a != n) or not in_order(gains, b, i, a):
                 continue
-            joint[b, i] = a
+            plans[b, s, i] = a
             rewards[b] += act(arrays, episodes, b, i, a)
             look_again(arrays, episodes, gains, b, i, a)
             taken[a] = True
             left -= 1
-        rewards[b] += send_idle(arrays, episodes, gains, b, joint[b])
+        rewards[b] += send_idle(arrays, episodes, gains, b, plans[b, s])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -7,6 +7,8 @@ earns is evaluated by the simulator, which knows which UAV unloads first.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from app.simulation.arrays import Floats, Integers, ProblemArrays
@@ -204,9 +206,10 @@ def _fly(
             q = choice[i]
             if s < length[q]:
                 going = True
-                if verdict(arrays, episodes, 0, i, targets[q, s]) != ALLOWED:
+                j: Any = np.int64(targets[q, s])  # so the simulator is not compiled for short numbers too
+                if verdict(arrays, episodes, 0, i, j) != ALLOWED:
                     return -np.inf
-                reward += act(arrays, episodes, 0, i, targets[q, s])
+                reward += act(arrays, episodes, 0, i, j)
         s += 1
     return reward + close(arrays, episodes, 0)
 

@@ -102,7 +102,7 @@ def test_corrections_begin_where_the_policy_was(policy):
         assert made.reward >= made.played - 1e-9
         firsts.append(made.first)
         gained.append(made.reward - made.played)
-    assert len(set(firsts)) > 2
+    assert {0, 1} <= set(firsts)
     assert max(gained) > 0.1
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from referee import replay
 from stopping import at_once
+from worlds import some_with_bases
 
 from app.domain.records import problem_to_record
 from app.learning.pairwise.rollout import play
@@ -58,6 +59,19 @@ def test_it_earns_more_than_the_best_of_the_plans(policy):
         gained.append(together.reward - single.reward)
     assert min(gained) >= 0.0
     assert np.mean(gained) > 0.05
+
+
+def test_routes_with_reloads_are_put_together_too(policy):
+    gained = []
+    for problem in some_with_bases(12):
+        arrays, record = compile_problem(problem), problem_to_record(problem)
+        plans, single, together = episodes(policy, arrays, 12, 2), BestPlan(arrays), BestPlan(arrays)
+        single.consider(plans)
+        Recombination(arrays, together).consider(plans, never)
+        assert replay(record, together.actions.tolist())["reward"] == pytest.approx(together.reward)
+        gained.append(together.reward - single.reward)
+    assert min(gained) >= 0.0
+    assert np.count_nonzero(gained) > 4
 
 
 def test_routes_of_earlier_plans_are_used(policy):

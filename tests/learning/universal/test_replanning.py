@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from referee import replay
 from stopping import at_once
+from worlds import some_with_bases
 
 from app.domain.records import problem_to_record
 from app.learning.universal.request.replanning import groups_of, replan, residual_of, round_of
@@ -123,6 +124,25 @@ def test_plans_are_allowed_and_the_last_is_never_worse(policy, family):
     assert (replayed.rule == 0).all()
     assert replayed.reward[-1] >= max(reward, replayed.reward[:-1].max()) - 1e-9
     assert replay(record, plans[-1].tolist())["reward"] == pytest.approx(replayed.reward[-1])
+
+
+def test_groups_reload_from_what_the_others_leave(policy):
+    reloads, gained = 0, 0
+    for problem in some_with_bases(12):
+        arrays, record = compile_problem(problem), problem_to_record(problem)
+        plan = policy.play(arrays, np.zeros(1, np.int64), np.random.default_rng(1)).plans[0]
+        reward = rewards_of(arrays, plan[None]).reward[0]
+        plans = replan(policy, arrays, plan, 64, np.random.default_rng(1))
+        if not len(plans):
+            continue
+        replayed = rewards_of(arrays, plans)
+        assert (replayed.rule == 0).all()
+        assert replay(record, plans[-1].tolist())["reward"] == pytest.approx(replayed.reward[-1])
+        assert replayed.reward[-1] >= reward - 1e-9
+        gained += replayed.reward[-1] > reward + 1e-9
+        reloads += int((plans > problem.n_targets).sum())
+    assert reloads > 100
+    assert gained > 4
 
 
 def test_a_plan_gets_better_group_by_group(policy):

@@ -268,7 +268,7 @@ def test_what_was_used_comes_back(store):
     some = {**SOME, "replans": 15, "polish": True, "orders": default.orders, "recombine": True}
     assert solve(store, problem, **SOME).parameters == TransferQmixParameters(**some).in_service()
     assert solve(store, problem, **SOME, replans=4).parameters.replans == 4
-    assert solve(store, problem, **{**BARE, "samples": 5}).parameters.replans == 0
+    assert solve(store, problem, **{**BARE, "samples": 5}).parameters.replans == 15
     most = fill_in(TransferQmixParameters(samples=MAX_SAMPLES), default).parameters
     assert TransferQmixParameters.model_validate(most.model_dump()) == most
     bare = {**BARE, "replans": 0, "polish_moves": 0, "orders": default.orders, "recombine": True}

@@ -118,7 +118,7 @@ def play(
                 _, which = np.unique(place * (n + 1) + actions, return_inverse=True)
                 branch[who] = branches + which
                 branches += count
-            _act_turn(arrays, episodes, gains, i, who, actions, plans[:, s], rewards)
+            _act_turn(arrays, episodes, gains, i, who, actions, plans, s, rewards)
         _end_steps(arrays, episodes, rewards)
         if episodes.done.all():
             break
@@ -162,12 +162,13 @@ def _act_turn(
     i: int,
     turn: Integers,
     actions: Integers,
-    joint: Integers,
+    plans: Integers,
+    s: int,
     rewards: Floats,
 ) -> None:
     for q in range(len(turn)):
         b, action = turn[q], actions[q]
-        joint[b, i] = action
+        plans[b, s, i] = action
         rewards[b] += act(arrays, episodes, b, i, action)
         look_again(arrays, episodes, gains, b, i, action)
 

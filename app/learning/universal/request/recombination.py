@@ -2,7 +2,7 @@
 
 An episode's plan is seldom good everywhere: the UAVs that did well in one did not in another. So plans are
 gone through UAV by UAV; each takes that of its routes, out of all episodes, with which the whole plan earns
-most. No route is changed, but for visits that others have made useless, which are left out.
+most. No route is changed, but for visits and reloads that others have made useless, which are left out.
 
 What a route adds after all others have flown is quickly told, and is what it adds in the whole plan where
 nobody else goes to its targets. So only the routes that promise most by that are flown with all others.
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.learning.universal.episodes.best_plan import BestPlan
-from app.learning.universal.episodes.routes import fly_last, fly_routes
+from app.learning.universal.episodes.routes import NOBODY, fly_last, fly_routes
 from app.simulation.arrays import Integers, ProblemArrays
 from app.simulation.compilation import njit
 from app.simulation.episodes import Episodes
@@ -50,7 +50,7 @@ class Recombination:
         m, n, _ = arrays.shape
         self._arrays, self._best = arrays, best
         self._plans: Integers = np.full((0, int(arrays.max_steps[0]), m), n, np.int64)
-        self._episodes = new_episodes(arrays, 1)
+        self._episodes = new_episodes(arrays, 2 if arrays.n_bases else 1)
 
     def consider(self, plans: Integers, stop: StopCriterion) -> None:
         """Look at plans, and at what routes of theirs and of those before make of them and of the best one.
@@ -119,7 +119,7 @@ def _improve(
     place, promises = np.empty(m, np.int64), np.empty(routes.shape[1])
     materials = arrays.load.shape[2]
     loads, needs = np.empty(materials), np.empty((steps, materials))
-    reward = fly_routes(arrays, episodes, tried, place, plan)
+    reward = fly_routes(arrays, episodes, tried, place, plan, NOBODY)
     turns = 0
     while unchanged < m and turns < piece:
         better = False
@@ -135,7 +135,7 @@ def _improve(
                 break
             promises[r] = -np.inf
             tried[i] = routes[i, r]
-            earned = fly_routes(arrays, episodes, tried, place, played)
+            earned = fly_routes(arrays, episodes, tried, place, played, NOBODY)
             if earned > reward + 1e-12 * abs(reward):
                 reward, better = earned, True
                 best[:] = played

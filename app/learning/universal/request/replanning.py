@@ -1,9 +1,9 @@
 """Episodes of a few UAVs: the policy plans their routes anew, in what the others of a plan leave to them.
 
 A whole episode that is better than a good plan everywhere is rare. So some UAVs near each other are taken out
-of the plan, all others fly as they do in it, and what then is still needed, with those UAVs alone, is a small
-problem, which a policy for every size plays as any other. Of each such group the best episode stays; where
-it makes the plan better, the next group finds it so.
+of the plan, all others fly as they do in it, and what then is still needed and in stock, with those UAVs
+alone, is a small problem, which a policy for every size plays as any other. Of each such group the best
+episode stays; where it makes the plan better, the next group finds it so.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from app.learning.universal.episodes.played import AnySizePolicy, exploration
-from app.learning.universal.episodes.routes import fly_routes
+from app.learning.universal.episodes.routes import NOBODY, fly_routes
 from app.simulation.arrays import Flags, Floats, Integers, ProblemArrays
 from app.simulation.compilation import njit
+from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
-from app.simulation.simulator import act, earned_now, new_episodes, reset_one, verdict
+from app.simulation.simulator import act, earned_now, new_episodes, reach_verdict, reset_one, verdict
 from app.simulation.stacks import part
-from app.simulation.visit import ALLOWED, COMMITTED_ELSEWHERE, START, leg
+from app.simulation.visit import ALLOWED, COMMITTED_ELSEWHERE, OUT_OF_RANGE, START, TOO_LONG_ALOFT, leg
 from app.simulation.worth import cost_of
 from app.solvers.protocol import StopCriterion, no_spare_threads
 from app.solvers.stop import never
@@ -104,7 +105,11 @@ def residual_of(arrays: ProblemArrays, plan: Integers, groups: Flags, rng: np.ra
     worthwhile = worth[row, targets] > -np.inf
     need = episodes.need[row, targets]
     left = part(arrays, uavs, targets)
-    left = left._replace(ret=left.ret | ~groups[row, uavs], need=np.where(worthwhile[:, :, None], need, 0.0))
+    left = left._replace(
+        ret=left.ret | ~groups[row, uavs],
+        need=np.where(worthwhile[:, :, None], need, 0.0),
+        stock=episodes.stock,
+    )
     return Residual(left, np.ascontiguousarray(uavs), np.ascontiguousarray(targets))
 
 
@@ -165,7 +170,7 @@ def _gaps(arrays: ProblemArrays, plan: Integers, one: int, flying: Integers, gap
         other, gap = flying[q], np.inf
         for s in range(plan.shape[0]):
             j = plan[s, one]
-            if j == n:
+            if j >= n:
                 continue
             visited = False
             for t in range(plan.shape[0]):
@@ -187,24 +192,29 @@ def _leave(
 ) -> None:
     """Fly a plan without a group in episode `g`, and write what each target is worth to the group.
 
-    That is minus infinite where none of its UAVs may go, now or later: loads and ranges only shrink. Else it
-    is infinite where one went in the plan, and elsewhere the most that one would earn there now.
+    That is minus infinite where none of its UAVs may go, now or later: loads and ranges only shrink, but for
+    reloads. Else it is infinite where one went in the plan, and elsewhere the most that one would earn there
+    now, or from where it is with a full load.
     """
-    n = arrays.need.shape[1]
+    n, reloads = arrays.need.shape[1], episodes.stock.shape[1] > 0
     reset_one(arrays, episodes, g)
     for s in range(plan.shape[0]):
         for i in range(plan.shape[1]):
             j = plan[s, i]
-            if j < n and not group[i] and verdict(arrays, episodes, g, i, j) == ALLOWED:
+            if j != n and not group[i] and verdict(arrays, episodes, g, i, j) == ALLOWED:
                 act(arrays, episodes, g, i, j)
     for j in range(n):
         worth[j] = -np.inf
         for i in range(plan.shape[1]):
-            # What a UAV is committed to may come first.
-            if group[i] and verdict(arrays, episodes, g, i, j) in (ALLOWED, COMMITTED_ELSEWHERE):
-                unloaded = 0.0
-                for k in range(episodes.load.shape[2]):
-                    unloaded += min(episodes.load[g, i, k], episodes.need[g, j, k])
+            if not group[i]:
+                continue
+            unloaded = 0.0
+            for k in range(episodes.load.shape[2]):
+                load = episodes.load[g, i, k]
+                if reloads:
+                    load = max(load, arrays.full[0, i, k])
+                unloaded += min(load, episodes.need[g, j, k])
+            if unloaded > 0.0 and _may_come(arrays, episodes, g, i, j):
                 cost = cost_of(arrays, 0, leg(arrays, 0, i, START, j))
                 worth[j] = max(worth[j], earned_now(arrays, episodes, g, i, j, unloaded) - cost)
     for i in range(plan.shape[1]):
@@ -212,6 +222,17 @@ def _leave(
             for s in range(plan.shape[0]):
                 if plan[s, i] < n and worth[plan[s, i]] > -np.inf:
                     worth[plan[s, i]] = np.inf
+
+
+@compiled
+def _may_come(arrays: ProblemArrays, episodes: Episodes, g: int, i: int, j: int) -> bool:
+    """Whether UAV `i` may go to target `j`, or might after what it is committed to, or after a reload."""
+    if episodes.ret[g, i]:
+        return False
+    rule = reach_verdict(arrays, episodes, g, i, j)
+    if episodes.stock.shape[1] > 0 and rule in (OUT_OF_RANGE, TOO_LONG_ALOFT):
+        return True
+    return rule in (ALLOWED, COMMITTED_ELSEWHERE)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -230,7 +251,7 @@ def _insert(
     steps, m = plan.shape
     n, home, groups = arrays.need.shape[1], targets.shape[1], len(uavs)
     place, flown, routes = np.empty(m, np.int64), plans[-1], np.ascontiguousarray(plan.T)
-    known = fly_routes(arrays, episodes, routes, place, flown)
+    known = fly_routes(arrays, episodes, routes, place, flown, NOBODY)
     rewards, best = np.full(groups, -np.inf), np.empty(groups, np.int64)
     for b in range(len(which)):
         g = which[b]
@@ -239,8 +260,8 @@ def _insert(
             if not absent[g, p]:
                 for s in range(steps):
                     j = played[b, s, p]
-                    routes[uavs[g, p], s] = targets[g, j] if j < home else n
-        reward = fly_routes(arrays, episodes, routes, place, plans[b])
+                    routes[uavs[g, p], s] = targets[g, j] if j < home else n + (j - home)
+        reward = fly_routes(arrays, episodes, routes, place, plans[b], NOBODY)
         if reward > rewards[g]:
             rewards[g], best[g] = reward, b
     merged = plan.copy()
@@ -249,7 +270,7 @@ def _insert(
         for p in range(uavs.shape[1]):
             if not absent[g, p]:
                 routes[uavs[g, p]] = plans[best[g], :, uavs[g, p]]
-        reward = fly_routes(arrays, episodes, routes, place, flown)
+        reward = fly_routes(arrays, episodes, routes, place, flown, NOBODY)
         if reward > known + 1e-12 * abs(known):
             known = reward
             merged[:] = flown

@@ -141,8 +141,8 @@ class UniversalTransfer:
         return self._arrays if policy.knows_reloads else without_reloads(self._arrays)
 
     def _consider(self, plans: Integers) -> None:
-        """Look at plans, and at what can be put together of their routes, where these have no reloads."""
-        if self._problem.bases or not self._used.recombine:
+        """Look at plans, and at what can be put together of their routes."""
+        if not self._used.recombine:
             self._best.consider(plans)
         else:
             self._recombination.consider(plans, self._stop)
@@ -190,8 +190,9 @@ class UniversalTransfer:
             self._tell("samples", done / wanted)
 
     def _replan(self, policy: AnySizePolicy) -> None:
-        # A group's problem has no reloads.
-        done, replans = 0, 0 if self._problem.bases else self._used.replans
+        # A group's problem has the reloads of the whole one.
+        able = policy.knows_reloads or not self._problem.bases
+        done, replans = 0, self._used.replans if able else 0
         while done < replans and not self._stop():
             plans = replan(
                 policy,
@@ -264,9 +265,7 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     polished = parameters.polish is not False
     moves = default.polish_moves if parameters.polish_moves is None else parameters.polish_moves
     moves = moves if polished else 0
-    # A request for samples alone is a request for a quick answer.
-    replans = REPLANS_A_SAMPLE * samples if n_epochs or moves else 0
-    replans = replans if parameters.replans is None else parameters.replans
+    replans = REPLANS_A_SAMPLE * samples if parameters.replans is None else parameters.replans
     single = orders == 1 and not (samples or replans or n_epochs)
     recombine = not single if parameters.recombine is None else parameters.recombine
     filled = parameters.in_service().model_copy(
