@@ -158,7 +158,7 @@ def test_the_page_speaks_the_language_of_the_browser_or_the_one_that_is_chosen(f
     assert state(page, "problem")["targets"][0]["x"] == 2.25
 
     page.wait_for_selector('html[data-kept="true"]')
-    page.get_by_label("Langue").select_option("English")
+    page.get_by_label("Langue").select_option("EN")
     expect(page.locator("html")).to_have_attribute("lang", "en")
     ready(page)
     expect(page.locator("#tab-compare")).to_have_text("Compare")

@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 import { resolved } from "./schema.js";
 import { plainNumber, t, writtenNumber } from "./texts.js";
 
-/** A limit above this says nothing to anybody. */
+/** A limit beyond this, or beyond its negative, says nothing to anybody. */
 const NO_LIMIT = 1e9;
 
 /**
@@ -102,7 +102,8 @@ function valueOf(schema, input) {
 
 function range({ minimum, maximum, exclusiveMinimum, type }) {
   if (type !== "number" && type !== "integer") return "";
-  const low = minimum ?? exclusiveMinimum;
+  const least = minimum ?? exclusiveMinimum;
+  const low = least < -NO_LIMIT ? undefined : least;
   const endless = maximum === undefined || maximum > NO_LIMIT;
   if (low === undefined && endless) return "";
   if (endless) return exclusiveMinimum === undefined ? t("At least {low}", { low }) : t("More than {low}", { low });

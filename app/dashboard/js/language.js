@@ -1,20 +1,15 @@
 /** Which language the page speaks: the browser's, or the one that was chosen on the page. */
 
-import { speak, t } from "./texts.js";
 import { h } from "./dom.js";
+import { speak, t } from "./texts.js";
 
-/** The languages by their codes: what each calls itself, and the region where neither the browser nor anybody names one. */
-const LANGUAGES = { en: ["English", "en"], es: ["Español", "es"], fr: ["Français", "fr"], pt: ["Português", "pt-PT"] };
+/** The languages by their codes, each with the region whose numbers it has where the browser names none. */
+const LANGUAGES = { en: "en", es: "es", fr: "fr", pt: "pt-PT" };
 /** The language of the texts in the modules. */
 const SOURCE = "en";
 const STORE = "dispatch-language";
 
 const codeOf = (tag) => tag.split("-")[0].toLowerCase();
-
-/** The code of the language that the page speaks. */
-export function language() {
-  return document.documentElement.lang;
-}
 
 /** Load the language, and say what the page itself says in it. */
 export async function loadLanguage() {
@@ -23,7 +18,7 @@ export async function loadLanguage() {
   const translations = code === SOURCE ? {} : await translationsOf(code);
   if (!translations) return;
   // The region decides how numbers are written: that of the browser, if it has this language.
-  speak(navigator.languages.find((tag) => codeOf(tag) === code) ?? LANGUAGES[code][1], translations);
+  speak(navigator.languages.find((tag) => codeOf(tag) === code) ?? LANGUAGES[code], translations);
   document.documentElement.lang = code;
   translate(document.body);
 }
@@ -53,12 +48,13 @@ function translate(element) {
   }
 }
 
-/** The choice of a language: the page is loaded again with it. */
+/** The choice of a language, by codes, as the bar has little room: the page is loaded again with it. */
 export function languageChoice() {
-  const options = Object.entries(LANGUAGES).map(([code, [name]]) => h("option", { value: code, lang: code, selected: code === language() }, name));
+  const nameOf = (code) => new Intl.DisplayNames(code, { type: "language" }).of(code);
+  const options = Object.keys(LANGUAGES).map((code) => h("option", { value: code, lang: code, title: nameOf(code), selected: code === document.documentElement.lang }, code.toUpperCase()));
   const choose = ({ target }) => {
     localStorage.setItem(STORE, target.value);
     location.reload();
   };
-  return h("select", { id: "language", "aria-label": t("Language"), translate: "no", onchange: choose }, options);
+  return h("select", { id: "language", "aria-label": t("Language"), title: t("Language"), translate: "no", onchange: choose }, options);
 }
