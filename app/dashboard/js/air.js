@@ -3,6 +3,7 @@
 import * as L from "../vendor/leaflet/leaflet.js";
 import { h, shown, svg } from "./dom.js";
 import { called } from "./plan.js";
+import { t } from "./texts.js";
 
 /** Zones and wind on a Leaflet map. */
 export class Air {
@@ -35,7 +36,7 @@ export class Air {
     for (const zone of zones) {
       const corners = zone.polygon.map(([x, y]) => latLng({ x, y }));
       const drawn = L.polygon(corners, { renderer: this.renderer, className: "no-fly-zone", weight: 1.5, smoothFactor: 0 });
-      drawn.bindTooltip(() => h("span", {}, `${called(zone)}: not to be flown through`), { sticky: true, className: "tip" });
+      drawn.bindTooltip(() => h("span", {}, t("{zone}: not to be flown through", { zone: called(zone) })), { sticky: true, className: "tip" });
       this.zones.addLayer(drawn);
       drawn.on("click", (event) => this.clicked(event, zone.id));
       drawn.getElement().dataset.zoneId = zone.id;
@@ -51,7 +52,7 @@ export class Air {
     this.control?.remove();
     this.control = null;
     if (!wind) return;
-    const says = `wind ${shown(wind.speed)}${this.unit} towards ${shown(wind.towards)}°`;
+    const says = t("wind {speed} towards {direction}°", { speed: `${shown(wind.speed)}${this.unit}`, direction: wind.towards });
     const arrow = svg("svg", { viewBox: "0 0 24 24", width: 24, height: 24, "aria-hidden": "true" },
       svg("path", { d: "M12 21V4M6 10l6-7 6 7", transform: `rotate(${wind.towards} 12 12)` }));
     this.control = L.control({ position: "topright" });

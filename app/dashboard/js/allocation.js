@@ -4,6 +4,7 @@ import { ApiError, follow, json } from "./api.js";
 import { forgetErrors, notify } from "./dom.js";
 import { showPlan } from "./history.js";
 import { get, set } from "./state.js";
+import { t } from "./texts.js";
 
 /** The request for the problem on screen. An objective that is the API's default is left out. */
 export function requestOf(problem, how) {
@@ -46,7 +47,7 @@ async function said(act) {
     await act();
   } catch (error) {
     if (!(error instanceof ApiError)) console.error(error);
-    const wait = error.retryAfter ? ` Try again in ${error.retryAfter} s.` : "";
+    const wait = error.retryAfter ? ` ${t("Try again in {seconds} s.", { seconds: error.retryAfter })}` : "";
     const why = `${error.message}.${wait}`.replace("..", ".");
     take({ status: "failed", error: why });
     set({ incumbent: null, violations: error.violations ?? [] });
@@ -65,6 +66,16 @@ export async function cancel() {
   } catch (error) {
     notify(error.message, "error");
   }
+}
+
+const STATUSES = {
+  sending: t("sending"), queued: t("queued"), running: t("running"), reconnecting: t("reconnecting"), stopping: t("stopping"),
+  succeeded: t("succeeded"), failed: t("failed"), cancelled: t("cancelled"),
+};
+
+/** What a status of a job is called: one of the service, or of a job whose request or stream is on its way. */
+export function statusName(status) {
+  return STATUSES[status] ?? status;
 }
 
 /** Whether a job is under way. */
@@ -92,8 +103,8 @@ function end(problem, opened, job) {
   take({ status: job.status, error: job.error?.detail, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
   set({ incumbent: null, violations: job.error?.errors ?? [] });
   if (job.error && get().view !== "allocate") notify(job.error.detail, "error");
-  if (!job.error && !job.result) notify("The job was cancelled before it had a plan");
+  if (!job.error && !job.result) notify(t("The job was cancelled before it had a plan"));
   if (!job.result) return;
   if (get().opened === opened) showPlan(problem, job.result);
-  else notify("The plan of the problem before is ready: it is among the recent plans");
+  else notify(t("The plan of the problem before is ready: it is among the recent plans"));
 }

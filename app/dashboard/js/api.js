@@ -1,5 +1,7 @@
 /** The service's public API: JSON, problem details, keys, entity tags and event streams. */
 
+import { t } from "./texts.js";
+
 const KEY = "allocator-key";
 const RETRY_MS = 1000;
 /** A stream that is silent so long is cut off: the service says something every 15 s. */
@@ -15,7 +17,7 @@ let asking = null;
  */
 export class ApiError extends Error {
   constructor(status, problem, retryAfter = null) {
-    super(problem.detail ?? `the service answered ${status}`);
+    super(problem.detail ?? t("the service answered {status}", { status }));
     this.status = status;
     this.problem = problem;
     this.violations = problem.errors ?? [];
@@ -76,7 +78,7 @@ async function reached(path, options) {
     return await fetch(address(path), options);
   } catch (error) {
     if (options.signal?.aborted) throw error;
-    throw new ApiError(0, { detail: "The service cannot be reached" });
+    throw new ApiError(0, { detail: t("The service cannot be reached") });
   }
 }
 
@@ -189,7 +191,7 @@ async function* events(stream) {
 /** Read on, but not for ever: a link that is gone does not always say so. */
 async function heard(reader) {
   let timer = null;
-  const silence = new Promise((_, reject) => { timer = setTimeout(() => reject(new ApiError(0, { detail: "The service has gone silent" })), SILENCE_MS); });
+  const silence = new Promise((_, reject) => { timer = setTimeout(() => reject(new ApiError(0, { detail: t("The service has gone silent") })), SILENCE_MS); });
   try {
     return await Promise.race([reader.read(), silence]);
   } finally {

@@ -3,6 +3,7 @@
 import uPlot from "../vendor/uplot/uplot.js";
 import { hue } from "./colours.js";
 import { h } from "./dom.js";
+import { shown, t } from "./texts.js";
 
 /**
  * Draw curves into an element, instead of what was there.
@@ -18,7 +19,7 @@ export function drawCurves(root, series, { x, height = 260, label }) {
   root.setAttribute("aria-label", label);
   const drawn = series.filter((each) => each.points.length);
   if (!drawn.length) {
-    root.append(h("p", { class: "muted" }, "Nothing to draw yet."));
+    root.append(h("p", { class: "muted" }, t("Nothing to draw yet.")));
     return;
   }
   const xs = [...new Set(drawn.flatMap((each) => each.points.map(([at]) => at)))].sort((a, b) => a - b);
@@ -26,7 +27,8 @@ export function drawCurves(root, series, { x, height = 260, label }) {
   const css = getComputedStyle(document.documentElement);
   const ink = css.getPropertyValue("--muted").trim() || "#555";
   const line = css.getPropertyValue("--line").trim() || "#ddd";
-  const axis = { stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui" };
+  const values = (_, marks) => marks.map((value) => shown(value, 6));
+  const axis = { values, stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui" };
   root.curve = new uPlot(
     {
       width: Math.max(280, root.clientWidth),

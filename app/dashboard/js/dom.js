@@ -1,5 +1,9 @@
 /** Elements, without markup in strings: what a client sent can never become part of the page's code. */
 
+import { betweenAmounts, shown, t, tn } from "./texts.js";
+
+export { shown };
+
 /**
  * Make an element.
  * @param {string} tag
@@ -36,31 +40,24 @@ export function number(value, digits = 4) {
   return h("data", { value: exact, title: exact }, shown(value, digits));
 }
 
-/** A number in at most so many significant digits, whole numbers in full. */
-export function shown(value, digits = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (Number.isInteger(value)) return String(value).replace("-", "−");
-  const text = Number(value.toPrecision(Math.max(digits, Math.floor(Math.log10(Math.abs(value))) + 1)));
-  return String(text).replace("-", "−");
-}
-
 const MANY_KINDS = 8;
 
 /** Amounts in a line, exact ones in them; of many kinds those that are not zero, each with its kind's number. */
 export function amounts(list) {
-  if (list.length <= MANY_KINDS) return list.flatMap((amount, k) => [k ? ", " : null, number(amount)]);
+  if (list.length <= MANY_KINDS) return list.flatMap((amount, k) => [k ? betweenAmounts() : null, number(amount)]);
   const some = list.map((amount, k) => [amount, k]).filter(([amount]) => amount);
-  if (!some.length) return ["nothing"];
-  const each = some.flatMap(([amount, k], n) => [n ? ", " : null, number(amount), h("span", { class: "hint" }, ` of kind ${k + 1}`)]);
-  return some.length <= MANY_KINDS ? each : [h("details", {}, h("summary", {}, `${some.length} kinds`), each)];
+  if (!some.length) return [t("nothing")];
+  const each = some.flatMap(([amount, k], n) => [n ? betweenAmounts() : null, number(amount), h("span", { class: "hint" }, " ", t("of kind {kind}", { kind: k + 1 }))]);
+  return some.length <= MANY_KINDS ? each : [h("details", {}, h("summary", {}, tn(some.length, "{count} kind", "{count} kinds")), each)];
 }
 
 /** The same as a text, and no more than the first of many kinds. */
-export function shortAmounts(list, between = ", ") {
+export function shortAmounts(list, between = betweenAmounts()) {
   if (list.length <= MANY_KINDS) return list.map((amount) => shown(amount)).join(between);
-  const some = list.flatMap((amount, k) => (amount ? [`${shown(amount)} of kind ${k + 1}`] : []));
-  if (!some.length) return "nothing";
-  return some.slice(0, 3).join(between) + (some.length > 3 ? ` and ${some.length - 3} more kinds` : "");
+  const some = list.flatMap((amount, k) => (amount ? [`${shown(amount)} ${t("of kind {kind}", { kind: k + 1 })}`] : []));
+  if (!some.length) return t("nothing");
+  const first = some.slice(0, 3).join(between);
+  return some.length > 3 ? tn(some.length - 3, "{first} and {count} more kind", "{first} and {count} more kinds", { first }) : first;
 }
 
 /** Take what was told of errors off the page: something new is tried. */
@@ -77,7 +74,7 @@ export function forgetErrors() {
 export function notify(text, tone = "info", offer = null) {
   const place = document.getElementById(tone === "error" ? "alerts" : "news");
   for (const same of [...place.children]) if (same.dataset.text === text) same.remove();
-  const close = h("button", { type: "button", class: "quiet", "aria-label": "Close this message", onclick: () => notice.remove() }, "×");
+  const close = h("button", { type: "button", class: "quiet", "aria-label": t("Close this message"), onclick: () => notice.remove() }, "×");
   const notice = h("div", { class: `notice ${tone}`, dataset: { text } }, h("p", {}, text), offer && h("button", { type: "button", class: "quiet", onclick: () => { notice.remove(); offer.act(); } }, offer.title), close);
   place.append(notice);
   const end = () => (notice.matches(":hover, :focus-within") ? setTimeout(end, 2_000) : notice.remove());

@@ -1,8 +1,8 @@
 /** A plan as the places that each UAV stops at, of visits and reloads, which are moved, added and removed by hand. No page, no requests. */
 
 import { called, placeNames } from "./plan.js";
-import { shown } from "./dom.js";
 import { placeOf, placeOfAction, placesOf } from "./stops.js";
+import { t } from "./texts.js";
 
 /** The places that each UAV stops at, in order. @returns {string[][]} one list a UAV of the problem */
 export function visitsOf(problem, answer) {
@@ -55,7 +55,8 @@ export function withoutBroken(problem, visits, breaches) {
 /** A rule that an action breaks, in words with its figures. @param {object} breach as `POST /evaluate` has it */
 export function saidOfBreach(breach, problem) {
   const uav = problem.uavs.find(({ id }) => id === breach.uav_id);
-  const where = breach.target_id === null ? "" : `, visit ${breach.step} (${placeNames(problem)(breach.target_id)})`;
-  const figures = breach.needed === null ? "" : `: needs ${shown(breach.needed)}, has ${shown(breach.had)}`;
-  return `${uav ? called(uav) : "The plan"}${where}: ${breach.says}${figures}`;
+  const who = uav ? called(uav) : t("The plan");
+  const where = breach.target_id === null ? who : t("{uav}, visit {step} ({area})", { uav: who, step: breach.step, area: placeNames(problem)(breach.target_id) });
+  const figures = breach.needed === null ? "" : `: ${t("needs {needed}, has {had}", { needed: breach.needed, had: breach.had })}`;
+  return `${where}: ${breach.says}${figures}`;
 }

@@ -3,8 +3,9 @@
 import { h } from "./dom.js";
 import { BASES, ZONES } from "./kinds.js";
 import { get, select, set } from "./state.js";
+import { t } from "./texts.js";
 
-const PARTS = { "/uavs": "UAVs", "/targets": "Areas", "/max_steps": "Decision steps" };
+const PARTS = { "/uavs": t("UAVs"), "/targets": t("Areas"), "/max_steps": t("Decision steps") };
 const LISTS = ["uavs", "targets", BASES, ZONES];
 
 /**

@@ -2,8 +2,9 @@
 
 import { h } from "./dom.js";
 import { resolved } from "./schema.js";
+import { plainNumber, t, writtenNumber } from "./texts.js";
 
-/** A limit above this says nothing to anybody. */
+/** A limit beyond this, or beyond its negative, says nothing to anybody. */
 const NO_LIMIT = 1e9;
 
 /**
@@ -53,7 +54,7 @@ export function labelled(title, input, { pointer, hint } = {}) {
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }
 
-function makeField(name, schema, { pointer, value, title = titleOf(name), onchange }) {
+function makeField(name, schema, { pointer, value, title = t(titleOf(name)), onchange }) {
   const given = value ?? schema.default;
   const input = inputFor(schema, given);
   input.name = name;
@@ -68,7 +69,7 @@ function forPeople(description) {
 }
 
 /** A parameter's name for people: `time_limit_s` is “Time limit, s”. */
-function titleOf(name) {
+export function titleOf(name) {
   const text = name.replace(/_s$/, ", s").replaceAll("_", " ");
   return text[0].toUpperCase() + text.slice(1);
 }
@@ -76,13 +77,13 @@ function titleOf(name) {
 function inputFor(schema, given) {
   const choices = schema.enum ?? (schema.type === "boolean" ? [true, false] : null);
   if (choices) {
-    const shown = [...(schema.nullable ? [["", "by itself"]] : []), ...choices.map((each) => [String(each), { true: "yes", false: "no" }[String(each)] ?? each])];
+    const shown = [...(schema.nullable ? [["", t("by itself")]] : []), ...choices.map((each) => [String(each), { true: t("yes"), false: t("no") }[String(each)] ?? each])];
     return h("select", {}, shown.map(([value, text]) => h("option", { value, selected: value === String(given ?? "") }, text)));
   }
   const numeric = schema.type === "number" || schema.type === "integer";
   return h("input", {
     type: "text", inputmode: numeric ? "decimal" : null, autocomplete: "off", spellcheck: "false",
-    value: given === null || given === undefined ? "" : String(given), placeholder: schema.nullable ? "by itself" : null,
+    value: given === null || given === undefined ? "" : numeric ? writtenNumber(given) : String(given), placeholder: schema.nullable ? t("by itself") : null,
   });
 }
 
@@ -92,15 +93,20 @@ function valueOf(schema, input) {
   if (text === "") return undefined;
   let value = text;
   if (schema.type === "boolean") value = text === "true";
-  else if ((schema.type === "number" || schema.type === "integer") && Number.isFinite(Number(text))) value = Number(text);
+  else if (schema.type === "number" || schema.type === "integer") {
+    const number = plainNumber(text);
+    if (Number.isFinite(Number(number))) value = Number(number);
+  }
   return value === schema.default ? undefined : value;
 }
 
 function range({ minimum, maximum, exclusiveMinimum, type }) {
   if (type !== "number" && type !== "integer") return "";
-  const low = minimum ?? exclusiveMinimum;
+  const least = minimum ?? exclusiveMinimum;
+  const low = least < -NO_LIMIT ? undefined : least;
   const endless = maximum === undefined || maximum > NO_LIMIT;
   if (low === undefined && endless) return "";
-  if (endless) return exclusiveMinimum === undefined ? `At least ${low}` : `More than ${low}`;
-  return `${exclusiveMinimum === undefined ? "" : "More than "}${low} to ${maximum}`;
+  if (endless) return exclusiveMinimum === undefined ? t("At least {low}", { low }) : t("More than {low}", { low });
+  if (low === undefined) return t("At most {high}", { high: maximum });
+  return exclusiveMinimum === undefined ? t("{low} to {high}", { low, high: maximum }) : t("More than {low} to {high}", { low, high: maximum });
 }

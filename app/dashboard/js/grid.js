@@ -1,6 +1,7 @@
 /** An editable table that is used from the keyboard like a spreadsheet. */
 
 import { h, shown } from "./dom.js";
+import { plainNumber, t, writtenNumber } from "./texts.js";
 
 /** With more rows than this only those near the ones in sight are there. */
 const WINDOW = 240;
@@ -37,7 +38,7 @@ export class Grid {
     const sameColumns = columns.map((c) => c.title).join() === this.columns.map((c) => c.title).join();
     if (!sameColumns) {
       this.rows.clear();
-      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" || column.text ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "visually-hidden" }, "Delete")));
+      this.head.replaceChildren(...columns.map((column) => h("th", { role: "columnheader", scope: "col", class: column.name === "id" || column.text ? null : "num" }, column.title)), h("th", { role: "columnheader" }, h("span", { class: "visually-hidden" }, t("Delete"))));
     }
     this.columns = columns;
     const active = document.activeElement?.closest?.("table") === this.element ? document.activeElement.closest("td") : null;
@@ -139,7 +140,8 @@ export class Grid {
       const value = column.read(item);
       return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" || column.text ? null : "num", dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
     });
-    const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": `Delete ${item.id}`, title: `Delete ${item.id}` }, "×");
+    const says = t("Delete {item}", { item: item.id });
+    const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": says, title: says }, "×");
     return h("tr", { role: "row", dataset: { id: item.id } }, cells, h("td", { role: "gridcell", tabindex: "-1" }, remove));
   }
 
@@ -180,17 +182,18 @@ export class Grid {
     if (!column || cell.querySelector("input")) return;
     const { id } = cell.parentElement.dataset;
     const value = column.read(this.rows.get(id).item);
-    const before = value === undefined ? "" : String(value);
+    const before = value === undefined ? "" : typeof value === "number" ? writtenNumber(value) : String(value);
     const was = [...cell.childNodes];
     const { row, column: at } = this.#place(cell);
-    const input = h("input", { "aria-label": `${column.title} of ${id}`, value: typed ?? before, spellcheck: "false" });
+    const input = h("input", { "aria-label": t("{field} of {item}", { field: column.title, item: id }), value: typed ?? before, spellcheck: "false" });
     let ended = false;
     const end = (keep, back) => {
       if (ended) return;
       ended = true;
       cell.replaceChildren(...was);
       if (back) this.focus(row, at);
-      if (keep && input.value.trim() !== before) this.options.onEdit(id, column, input.value.trim());
+      const text = input.value.trim();
+      if (keep && text !== before) this.options.onEdit(id, column, column.text ? text : plainNumber(text));
     };
     input.addEventListener("keydown", (event) => {
       if (event.key === "Enter" || event.key === "Escape") {

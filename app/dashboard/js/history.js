@@ -2,6 +2,7 @@
 
 import { notify } from "./dom.js";
 import { get, set } from "./state.js";
+import { t } from "./texts.js";
 
 const MOST_UNDONE = 100;
 const PARTS = ["problem", "problemName", "opened", "answer", "answerProblem", "draft", "colours"];
@@ -28,7 +29,7 @@ export function showPlan(problem, answer, rest = {}) {
   const aside = get().draft;
   if (get().answer || ("problem" in rest && rest.problem !== get().problem)) change(shown);
   else set(shown);
-  if (aside) notify("The plan that you were changing is set aside: Undo brings it back", "info", { title: "Undo", act: undo });
+  if (aside) notify(t("The plan that you were changing is set aside: Undo brings it back"), "info", { title: t("Undo"), act: undo });
 }
 
 export function undo() {

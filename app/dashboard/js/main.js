@@ -1,4 +1,4 @@
-/** Start of the page: the service's facts, the tabs, the keyboard, the key dialog. */
+/** The page: the service's facts, the tabs, the keyboard, the key dialog. */
 
 import { keepAddress, read } from "./address.js";
 import { resume, running } from "./allocation.js";
@@ -8,6 +8,7 @@ import { h, notify } from "./dom.js";
 import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
 import { keepProblem, restore } from "./keep.js";
+import { languageChoice } from "./language.js";
 import { DispatchMap } from "./map.js";
 import { lastOpen, openMission } from "./missions/feed.js";
 import { keepUntold } from "./missions/outbox.js";
@@ -16,7 +17,9 @@ import { open } from "./problem.js";
 import { openPlan } from "./recent.js";
 import { allViews } from "./registry.js";
 import { fieldsOf } from "./schema.js";
+import { sizeText } from "./sizes.js";
 import { get, set, subscribe } from "./state.js";
+import { t } from "./texts.js";
 import { allocateNow } from "./views/allocate.js";
 import "./views/index.js";
 
@@ -111,7 +114,7 @@ function makeKeyDialog() {
   byId("key-forget").addEventListener("click", () => {
     useKey(null);
     dialog.close();
-    notify("The key is forgotten.");
+    notify(t("The key is forgotten."));
   });
   byId("key").addEventListener("click", async () => {
     const key = await askForKey();
@@ -152,9 +155,9 @@ async function watchService() {
   };
   try {
     await send("readyz");
-    tell("up", "Ready");
+    tell("up", t("Ready"));
   } catch (error) {
-    tell("down", error.status ? "Not ready" : "Not reachable");
+    tell("down", error.status ? t("Not ready") : t("Not reachable"));
   }
   if (missing) await load();
   clearTimeout(looking);
@@ -162,7 +165,7 @@ async function watchService() {
 }
 
 function titleProblem({ problem, problemName }) {
-  const sizes = problem && `${problem.uavs.length} UAVs, ${problem.targets.length} areas`;
+  const sizes = problem && sizeText(problem.uavs.length, problem.targets.length);
   byId("problem-title").textContent = problem ? `${problemName} · ${sizes}` : "";
 }
 
@@ -185,7 +188,7 @@ async function load() {
 
 /** Bring back what this tab showed last; a job that was under way is followed on. */
 async function comeBack() {
-  const kept = await restore((why) => notify(`This browser keeps nothing (${why}): export what you need before you leave.`, "error"));
+  const kept = await restore((why) => notify(t("This browser keeps nothing ({why}): export what you need before you leave.", { why }), "error"));
   keepProblem();
   if (!kept) return;
   set(kept);
@@ -211,10 +214,11 @@ async function start() {
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();
+  byId("key").before(languageChoice());
   if (asked) set({ view: asked.view });
   await comeBack();
   await load();
-  if (!get().problem) open({}, "New problem");
+  if (!get().problem) open({}, t("New problem"));
   const mission = asked?.view === "missions" ? asked.mission : lastOpen();
   if (mission) openMission(mission);
   goOn();

@@ -2,6 +2,7 @@
 
 import { position, requestedBy } from "./problem.js";
 import { baseOf, flightsOf, isReload, placeOf, placeOfAction, placesOf } from "./stops.js";
+import { t } from "./texts.js";
 
 /** What an item is called: its name, where it has one; names need not be unique, so its id stands beside it. */
 export function called({ id, name }) {
@@ -14,13 +15,18 @@ export function names(items) {
   return (id) => known.get(id) ?? id;
 }
 
+/** What a base is called among other stops. @param {string} name or id */
+export function baseName(name) {
+  return t("base {name}", { name });
+}
+
 /** What places are called; of a base that it is one. @returns {(place: string) => string} */
 export function placeNames(...problems) {
   const known = new Map(problems.flatMap((problem) => [...placesOf(problem)]));
   return (place) => {
     const item = known.get(place);
     const name = item ? called(item) : (baseOf(place) ?? place);
-    return baseOf(place) === null ? name : `base ${name}`;
+    return baseOf(place) === null ? name : baseName(name);
   };
 }
 

@@ -9,6 +9,7 @@ import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
 import { get, select, set } from "./state.js";
 import { baseOf, placesOf } from "./stops.js";
+import { t, tn, tNodes } from "./texts.js";
 
 /** What the service says of the draft, and what can become of it. */
 export function judgement(problem, answer, draft) {
@@ -16,23 +17,23 @@ export function judgement(problem, answer, draft) {
   const legal = Boolean(evaluation);
   const difference = legal ? evaluation.reward - answer.reward : 0;
   let says;
-  if (trouble) says = ["The plan is not judged yet: ", trouble, ". What you changed is kept. ", h("button", { type: "button", onclick: judgeAgain }, "Ask again")];
-  else if (refusal) says = [refusal.breaches.length ? `${refusal.breaches.length === 1 ? "One visit breaks" : `${refusal.breaches.length} visits break`} a rule, and ${refusal.breaches.length === 1 ? "it" : "each"} would not be flown:` : refusal.detail];
-  else if (legal) says = ["Reward ", number(evaluation.reward), ", ", h("strong", {}, h("data", { value: String(difference) }, `${difference < 0 ? "" : "+"}${shown(difference)}`)), " to the plan before."];
-  else says = ["The service is asked …"];
+  if (trouble) says = [t("The plan is not judged yet: {why}. What you changed is kept.", { why: trouble }), " ", h("button", { type: "button", onclick: judgeAgain }, t("Ask again"))];
+  else if (refusal) says = [refusal.breaches.length ? tn(refusal.breaches.length, "One visit breaks a rule, and it would not be flown:", "{count} visits break a rule, and each would not be flown:") : refusal.detail];
+  else if (legal) says = tNodes("Reward {reward}, {difference} to the plan before.", { reward: number(evaluation.reward), difference: h("strong", {}, h("data", { value: String(difference) }, `${difference < 0 ? "" : "+"}${shown(difference)}`)) });
+  else says = [t("The service is asked …")];
   const button = (title, act, needs = true) => h("button", { type: "button", disabled: !needs, onclick: act }, title);
   return h("section", { class: "card block", id: "draft", "data-judged": legal ? "legal" : refusal ? "refused" : trouble ? "trouble" : "asking" },
-    h("h2", {}, "Your change of the plan"), h("div", { role: "status", id: "draft-says" }, says),
+    h("h2", {}, t("Your change of the plan")), h("div", { role: "status", id: "draft-says" }, says),
     refusal && h("ul", { class: "violations", id: "breaches" }, refusal.breaches.map((breach) => h("li", { class: "error", dataset: { rule: breach.rule } }, saidOfBreach(breach, problem)))),
-    refusal?.breaches.length > 0 && h("div", {}, h("button", { type: "button", onclick: () => takeOut(problem, draft) }, refusal.breaches.length === 1 ? "Take it out" : "Take them out")),
-    h("div", { class: "row" }, button("Keep this plan", keepDraft, legal),
-      button("Begin the next allocation with it", () => { beginWith(draft.visits); set({ view: "allocate" }); }, legal), button("Leave the plan as it was", dropDraft)));
+    refusal?.breaches.length > 0 && h("div", {}, h("button", { type: "button", onclick: () => takeOut(problem, draft) }, refusal.breaches.length === 1 ? t("Take it out") : t("Take them out"))),
+    h("div", { class: "row" }, button(t("Keep this plan"), keepDraft, legal),
+      button(t("Begin the next allocation with it"), () => { beginWith(draft.visits); set({ view: "allocate" }); }, legal), button(t("Leave the plan as it was"), dropDraft)));
 }
 
 /** Go on without the visits that break a rule. */
 function takeOut(problem, { visits, refusal }) {
   const left = withoutBroken(problem, visits, refusal.breaches);
-  if (left === visits) notify("No visit would have to go: the plan as a whole breaks a rule", "error");
+  if (left === visits) notify(t("No visit would have to go: the plan as a whole breaks a rule"), "error");
   else changeDraft(left);
 }
 
@@ -44,9 +45,9 @@ export class PlanEditor {
     this.nameOf = placeNames(problem);
     this.form = null;
     this.body = h("tbody", {});
-    this.element = h("details", { open: true }, h("summary", {}, "Routes, to be changed"),
-      h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes, to be changed" }, h("table", { id: "draft-routes" },
-        h("thead", {}, h("tr", {}, ["#", "Area", "Arrives", ""].map((title) => h(title ? "th" : "td", title ? { scope: "col", class: title === "Arrives" ? "num" : null } : {}, title)))), this.body)));
+    this.element = h("details", { open: true }, h("summary", {}, t("Routes, to be changed")),
+      h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": t("Routes, to be changed") }, h("table", { id: "draft-routes" },
+        h("thead", {}, h("tr", {}, ["#", t("Area"), t("Arrives"), ""].map((title, at) => h(title ? "th" : "td", title ? { scope: "col", class: at === 2 ? "num" : null } : {}, title)))), this.body)));
     this.portions = new Portions(this.body, problem.uavs, (uav, i) => this.#rows(uav, i), (button) => h("tr", {}, h("td", { colspan: "4" }, button)));
     this.#listenToDragging();
     this.wanted = focus;
@@ -65,7 +66,7 @@ export class PlanEditor {
     for (const row of this.body.querySelectorAll("tr[data-at]")) {
       const { uavId, at } = row.dataset;
       row.classList.toggle("broken", broken.has(`${uavId}\n${at}`));
-      row.querySelector(".num").replaceChildren(broken.has(`${uavId}\n${at}`) ? h("span", { class: "error" }, "not allowed") : number(arrivals.get(uavId)?.[at]));
+      row.querySelector(".num").replaceChildren(broken.has(`${uavId}\n${at}`) ? h("span", { class: "error" }, t("not allowed")) : number(arrivals.get(uavId)?.[at]));
     }
   }
 
@@ -80,7 +81,7 @@ export class PlanEditor {
 
   #rows(uav, i) {
     const key = paint(h("span", { class: "key", "aria-hidden": "true" }), uav.id);
-    const add = h("button", { type: "button", class: "quiet", "aria-label": `Add a visit to ${called(uav)}`, dataset: { act: "add" }, onclick: ({ target }) => this.#ask(target, { uav: i, at: this.visits[i].length }, null) }, "Add…");
+    const add = h("button", { type: "button", class: "quiet", "aria-label": t("Add a visit to {uav}", { uav: called(uav) }), dataset: { act: "add" }, onclick: ({ target }) => this.#ask(target, { uav: i, at: this.visits[i].length }, null) }, t("Add…"));
     return [
       h("tr", { class: "head", dataset: { uavId: uav.id, uav: i } }, h("th", { scope: "row", colspan: "3" }, h("button", { type: "button", class: "quiet", title: uav.id, onclick: () => select({ kind: "uavs", id: uav.id }) }, key, called(uav))), h("td", { class: "acts" }, add)),
       ...this.visits[i].map((id, at) => this.#visit(uav, i, id, at)),
@@ -89,14 +90,14 @@ export class PlanEditor {
 
   #visit(uav, i, id, at) {
     const name = this.nameOf(id);
-    const act = (sign, what, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": `${what}: ${name}, visit ${at + 1} of ${called(uav)}`, title: what, dataset: { act: what }, disabled: !possible, onclick: does }, sign);
+    const act = (name_, sign, title, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": t("{act}: {area}, visit {number} of {uav}", { act: title, area: name, number: at + 1, uav: called(uav) }), title, dataset: { act: name_ }, disabled: !possible, onclick: does }, sign);
     const to = (place, what) => this.#change(withMoved(this.visits, { uav: i, at }, { uav: i, at: place }), { uav: i, at: place, act: what });
     return h("tr", { draggable: "true", dataset: { uavId: uav.id, uav: i, at, targetId: id } },
-      h("td", { class: "n" }, String(at + 1)), h("td", { title: baseOf(id) ?? id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, "locked")]), h("td", { class: "num" }, "–"),
+      h("td", { class: "n" }, String(at + 1)), h("td", { title: baseOf(id) ?? id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, t("locked"))]), h("td", { class: "num" }, "–"),
       h("td", { class: "acts" },
-        act("↑", "Earlier", () => to(at - 1, "Earlier"), at > 0), act("↓", "Later", () => to(at + 1, "Later"), at < this.visits[i].length - 1),
-        act("Move…", "Move", ({ target }) => this.#ask(target, { uav: i, at }, id)),
-        act("×", "Remove", () => this.#change(withoutVisit(this.visits, { uav: i, at }), { uav: i, at: Math.min(at, this.visits[i].length - 2), act: "Remove" }))));
+        act("Earlier", "↑", t("Earlier"), () => to(at - 1, "Earlier"), at > 0), act("Later", "↓", t("Later"), () => to(at + 1, "Later"), at < this.visits[i].length - 1),
+        act("Move", t("Move…"), t("Move"), ({ target }) => this.#ask(target, { uav: i, at }, id)),
+        act("Remove", "×", t("Remove"), () => this.#change(withoutVisit(this.visits, { uav: i, at }), { uav: i, at: Math.min(at, this.visits[i].length - 2), act: "Remove" }))));
   }
 
   /** Ask below a row where a visit goes, or which area one is added of. @param {string | null} id null: to be chosen */
@@ -119,7 +120,7 @@ export class PlanEditor {
       event.preventDefault();
       const to = { uav: Number(uav.value), at: Number(place.value) - 1 };
       this.#change(id === null ? withVisit(visits, to, area.value) : withMoved(visits, from, to), { ...to, act: "Move" });
-    } }, area && h("label", {}, "Area", area), h("label", {}, "UAV", uav), h("label", {}, "Place", place), h("button", {}, id === null ? "Add" : "Move"), h("button", { type: "button", class: "quiet", onclick: close }, "Cancel"));
+    } }, area && h("label", {}, t("Area"), area), h("label", {}, t("UAV"), uav), h("label", {}, t("Place"), place), h("button", {}, id === null ? t("Add") : t("Move")), h("button", { type: "button", class: "quiet", onclick: close }, t("Cancel")));
     this.form = h("tr", { class: "asked" }, h("td", { colspan: "4" }, form));
     button.closest("tr").after(this.form);
     form.querySelector("select").focus();

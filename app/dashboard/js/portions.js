@@ -1,6 +1,7 @@
 /** Long lists in portions: the first elements are there, a button brings the next. */
 
 import { h } from "./dom.js";
+import { t } from "./texts.js";
 
 const PORTION = 100;
 
@@ -33,7 +34,7 @@ export class Portions {
     }
     const left = this.items.length - this.count;
     if (!left) return this.more.remove();
-    this.button.textContent = `Show ${Math.min(PORTION, left)} more of ${left}`;
+    this.button.textContent = t("Show {count} more of {all}", { count: Math.min(PORTION, left), all: left });
     this.place.append(this.more);
   }
 

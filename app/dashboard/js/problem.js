@@ -6,6 +6,7 @@ import { BASES, STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
 import { amountsOf, itemFields } from "./schema.js";
 import { get, select, set } from "./state.js";
+import { tn } from "./texts.js";
 
 /** A problem with ids filled in and what is not set left out. */
 export function normalised({ uavs = [], targets = [], ...settings }) {
@@ -120,7 +121,7 @@ export function addZone(polygon) {
 export function withoutCorner(id, at) {
   const { polygon } = get().problem[ZONES].find((zone) => zone.id === id);
   const fewest = fewestCorners();
-  if (polygon.length <= fewest) return notify(`A zone has at least ${fewest} corners: delete the whole zone instead`, "error");
+  if (polygon.length <= fewest) return notify(tn(fewest, "A zone has at least {count} corner: delete the whole zone instead", "A zone has at least {count} corners: delete the whole zone instead"), "error");
   update(ZONES, id, { polygon: polygon.toSpliced(at, 1) });
 }
 

@@ -1,10 +1,11 @@
 /** Plans that the service still has: listed, and opened again with their problems. */
 
-import { resume } from "./allocation.js";
+import { resume, statusName } from "./allocation.js";
 import { json } from "./api.js";
 import { change, showPlan } from "./history.js";
 import { newOpening, normalised } from "./problem.js";
 import { get } from "./state.js";
+import { t } from "./texts.js";
 
 const KINDS = new Set(["allocate", "batch"]);
 /** Plans that are listed at least, where there are as many. */
@@ -34,9 +35,9 @@ export async function recentPlans(cursor = null) {
 export async function openPlan(id) {
   const [job, given] = await Promise.all([json(`jobs/${id}`), json(`jobs/${id}/problem`)]);
   const problem = normalised(given);
-  const opening = { problem, problemName: `Plan ${id.slice(0, 8)}`, opened: newOpening(), colours: {}, selection: null };
+  const opening = { problem, problemName: t("Plan {plan}", { plan: id.slice(0, 8) }), opened: newOpening(), colours: {}, selection: null };
   if (job.result?.routes) return showPlan(problem, job.result, opening);
-  if (ENDED.has(job.status) || !KINDS.has(job.kind)) throw new Error(`job ${id} (${job.kind}, ${job.status}) has no plan`);
+  if (ENDED.has(job.status) || !KINDS.has(job.kind)) throw new Error(t("job {id} ({kind}, {status}) has no plan", { id, kind: job.kind, status: statusName(job.status) }));
   change({ ...opening, answer: null, answerProblem: null, incumbent: null });
   void resume(id, get().problem);
 }

@@ -3,6 +3,7 @@
 import * as L from "../vendor/leaflet/leaflet.js";
 import { called } from "./plan.js";
 import { withoutCorner } from "./problem.js";
+import { t } from "./texts.js";
 import { cornerIcon, drawSides } from "./zone_outline.js";
 import { crossings } from "./zones.js";
 
@@ -45,7 +46,7 @@ export class ZoneCorners {
   }
 
   #addCorner(zone, at) {
-    const name = `Corner ${at + 1} of ${called(zone)}`;
+    const name = t("Corner {number} of {zone}", { number: at + 1, zone: called(zone) });
     const marker = this.#handle(this.#latLng(zone.polygon[at]), "corner", name);
     marker.on("drag", () => this.#drawSides(zone.polygon.with(at, this.#corner(marker))));
     marker.on("dragend", () => this.options.changed(zone.id, zone.polygon.with(at, this.#corner(marker))));
@@ -65,7 +66,7 @@ export class ZoneCorners {
   #addBetween(zone, at) {
     const [one, other] = [at, (at + 1) % zone.polygon.length].map((corner) => L.latLng(this.#latLng(zone.polygon[corner])));
     const middle = this.map.layerPointToLatLng(this.map.latLngToLayerPoint(one).add(this.map.latLngToLayerPoint(other)).divideBy(2));
-    const marker = this.#handle(middle, "corner between", `New corner after corner ${at + 1} of ${called(zone)}`);
+    const marker = this.#handle(middle, "corner between", t("New corner after corner {number} of {zone}", { number: at + 1, zone: called(zone) }));
     const inserted = () => zone.polygon.toSpliced(at + 1, 0, this.#corner(marker));
     marker.on("drag", () => this.#drawSides(inserted()));
     const insert = () => this.options.changed(zone.id, inserted());

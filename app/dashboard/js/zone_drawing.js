@@ -2,6 +2,7 @@
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { notify } from "./dom.js";
+import { tn } from "./texts.js";
 import { cornerIcon, drawSides } from "./zone_outline.js";
 import { crossings, saidOfCrossings } from "./zones.js";
 
@@ -35,7 +36,7 @@ export class ZoneDrawing {
   /** What is to be said of it now. */
   get says() {
     const { length } = this.corners;
-    return [`${length} ${length === 1 ? "corner" : "corners"}.`, saidOfCrossings(this.pairs, length)].filter(Boolean).join(" ");
+    return [tn(length, "{count} corner.", "{count} corners."), saidOfCrossings(this.pairs, length)].filter(Boolean).join(" ");
   }
 
   /** Whether sides that are there cross. */
@@ -64,7 +65,7 @@ export class ZoneDrawing {
   /** End it as a zone; with too few corners it goes on. */
   finish() {
     const { fewest } = this.options;
-    if (this.corners.length < fewest) return notify(`A zone has at least ${fewest} corners`, "error");
+    if (this.corners.length < fewest) return notify(tn(fewest, "A zone has at least {count} corner", "A zone has at least {count} corners"), "error");
     this.#end(this.corners);
   }
 

@@ -3,6 +3,8 @@
  * before that what it sees.
  */
 
+import { t, tn } from "./texts.js";
+
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
 /**
@@ -23,10 +25,10 @@ export function crossings(crs, corners, closed = true) {
 /** What is said of the first sides that cross; empty where none do. */
 export function saidOfCrossings(pairs, count) {
   if (!pairs.length) return "";
-  const [one, other] = pairs[0].map((side) => `corner ${side + 1} to ${((side + 1) % count) + 1}`);
+  const [one, other] = pairs[0].map((side) => t("corner {from} to {to}", { from: side + 1, to: ((side + 1) % count) + 1 }));
   const others = pairs.length - 1;
-  const more = others ? `, and ${others} more ${others === 1 ? "pair crosses" : "pairs cross"}` : "";
-  return `The side from ${one} crosses that from ${other}${more}.`;
+  if (!others) return t("The side from {one} crosses that from {other}.", { one, other });
+  return tn(others, "The side from {one} crosses that from {other}, and {count} more pair crosses.", "The side from {one} crosses that from {other}, and {count} more pairs cross.", { one, other });
 }
 
 /** A gnomonic projection: sides, which are arcs of great circles, are straight on it. */

@@ -1,7 +1,8 @@
 /** The clock of a mission: look at another moment of it, move it on, or let it follow the clock on the wall. */
 
-import { h, notify, shown } from "../dom.js";
+import { h, notify } from "../dom.js";
 import { get } from "../state.js";
+import { t } from "../texts.js";
 import { allTimes, course } from "../times.js";
 import { tell } from "./outbox.js";
 import { follow, halt, onPace, pace } from "./pace.js";
@@ -14,12 +15,12 @@ export class ClockCard {
   constructor(look) {
     this.look = look;
     this.at = 0;
-    this.slider = h("input", { type: "range", min: "0", step: "any", "aria-label": "Moment", id: "mission-slider", oninput: () => this.#go(Number(this.slider.value)) });
-    this.exact = h("input", { type: "number", min: "0", step: "any", "aria-label": "Time", id: "mission-time", onchange: () => this.#go(Number(this.exact.value)) });
+    this.slider = h("input", { type: "range", min: "0", step: "any", "aria-label": t("Moment"), id: "mission-slider", oninput: () => this.#go(Number(this.slider.value)) });
+    this.exact = h("input", { type: "number", min: "0", step: "any", "aria-label": t("Time"), id: "mission-time", onchange: () => this.#go(Number(this.exact.value)) });
     this.clock = h("output", { for: "mission-slider mission-time", "data-testid": "mission-clock" });
     this.says = h("p", { class: "hint", role: "status", "data-testid": "mission-moment" });
-    this.advance = h("button", { type: "button", class: "primary", onclick: () => void this.#advance() }, "Move the clock here");
-    this.now = h("button", { type: "button", class: "quiet", onclick: () => this.#go(null) }, "Back to now");
+    this.advance = h("button", { type: "button", class: "primary", onclick: () => void this.#advance() }, t("Move the clock here"));
+    this.now = h("button", { type: "button", class: "quiet", onclick: () => this.#go(null) }, t("Back to now"));
     this.seconds = h("input", { type: "number", min: "0.1", step: "any", name: "seconds" });
     this.follows = h("button", { type: "button", onclick: () => this.#follow() });
     this.trouble = h("p", { class: "error", role: "alert", hidden: true });
@@ -29,9 +30,9 @@ export class ClockCard {
       this.#drawPace();
     });
     this.unit = h("span", {});
-    this.element = h("section", { class: "card", "aria-label": "Clock" }, h("h3", {}, "Clock"),
+    this.element = h("section", { class: "card", "aria-label": t("Clock") }, h("h3", {}, t("Clock")),
       h("p", { class: "clock" }, this.slider, this.exact, this.clock),
-      h("div", { class: "row" }, h("button", { type: "button", onclick: () => this.#step(-1) }, "Event before"), h("button", { type: "button", onclick: () => this.#step(1) }, "Next event"), this.advance, this.now),
+      h("div", { class: "row" }, h("button", { type: "button", onclick: () => this.#step(-1) }, t("Event before")), h("button", { type: "button", onclick: () => this.#step(1) }, t("Next event")), this.advance, this.now),
       this.says,
       h("label", { class: "line" }, this.unit, this.seconds), h("div", { class: "row" }, this.follows), this.trouble);
   }
@@ -41,7 +42,7 @@ export class ClockCard {
     const { head, plan } = mission;
     if (this.id !== mission.id) {
       this.id = mission.id;
-      this.unit.textContent = head.state.problem.crs === "wgs84" ? "An hour takes, s" : "A unit of time takes, s";
+      this.unit.textContent = head.state.problem.crs === "wgs84" ? t("An hour takes, s") : t("A unit of time takes, s");
       this.seconds.value = String(pace()?.mission === mission.id ? pace().seconds : HOUR_S);
     }
     const { moments } = course(head.state.problem, allTimes(head.state.problem, plan));
@@ -52,7 +53,8 @@ export class ClockCard {
     this.slider.max = String(end);
     if (moved !== this.slider || Number(this.slider.value) !== at) this.slider.value = String(at);
     if (moved !== this.exact) this.exact.value = String(Number(at.toPrecision(6)));
-    this.clock.textContent = `${shown(head.clock)} of ${shown(end)}${head.state.problem.crs === "wgs84" ? " h" : ""}`;
+    const clock = { clock: head.clock, end };
+    this.clock.textContent = head.state.problem.crs === "wgs84" ? t("{clock} of {end} h", clock) : t("{clock} of {end}", clock);
     this.advance.hidden = at <= head.clock;
     this.now.hidden = at === head.clock;
     if (this.says.textContent !== says) this.says.textContent = says;
@@ -81,13 +83,13 @@ export class ClockCard {
   #follow() {
     if (pace()?.mission === this.id) halt();
     else if (Number(this.seconds.value) > 0) follow(this.id, Number(this.seconds.value));
-    else return notify("The clock needs a number of seconds above 0", "error");
+    else return notify(t("The clock needs a number of seconds above 0"), "error");
     this.#drawPace();
   }
 
   #drawPace() {
     const follows = pace()?.mission === this.id;
-    this.follows.textContent = follows ? "Halt the clock" : "Follow the clock on the wall";
+    this.follows.textContent = follows ? t("Halt the clock") : t("Follow the clock on the wall");
     this.follows.setAttribute("aria-pressed", String(follows));
     this.seconds.disabled = follows;
   }

@@ -1,8 +1,8 @@
 /** What the UAVs of a mission do at its clock: from its state and the plan in force, as the service says them. */
 
-import { shown } from "../dom.js";
 import { stateOf } from "../plan.js";
 import { isReload, placeOf } from "../stops.js";
+import { t } from "../texts.js";
 import { timesOf } from "../times.js";
 
 /** The problem of a state as it is drawn: UAVs are where they were seen since, and those that are lost are out. */
@@ -23,25 +23,25 @@ export function asSeen(state, positions, stateNumber) {
  * @param {(place: string) => string} nameOf what places are called
  */
 export function doing(uav, route, state, nameOf) {
-  if (state.lost.includes(uav.id)) return "lost";
+  if (state.lost.includes(uav.id)) return t("lost");
   const { clock } = state;
   const aloft = stateOf(uav) !== "at its base";
   const last = state.done.findLast((each) => each.uav_id === uav.id);
   if ((uav.available_from ?? 0) > clock) {
-    const until = `until ${shown(uav.available_from)}`;
-    if (!last) return `waits ${until}`;
+    const until = uav.available_from;
+    if (!last) return t("waits until {until}", { until });
     const place = placeOf(last.base_id ? { kind: "reload", base_id: last.base_id } : last);
-    return last.base_id ? `reloads at ${nameOf(place)} ${until}` : `at ${nameOf(place)} ${until}`;
+    return last.base_id ? t("reloads at {place} until {until}", { place: nameOf(place), until }) : t("at {place} until {until}", { place: nameOf(place), until });
   }
   const [next] = route?.stops ?? [];
   if (next) {
     const { stops: [first] } = timesOf(uav, route, new Map(state.problem.targets.map((target) => [target.id, target])));
-    if (first.waits?.onGround) return `takes off at ${shown(first.left)} to ${nameOf(first.id)}`;
-    return `to ${nameOf(first.id)}, there at ${shown(first.arrival)}`;
+    if (first.waits?.onGround) return t("takes off at {time} to {place}", { time: first.left, place: nameOf(first.id) });
+    return t("to {place}, there at {time}", { time: first.arrival, place: nameOf(first.id) });
   }
-  if (uav.ret) return "flies home";
-  if (aloft && (route?.landing?.time ?? clock) > clock) return `flies home, there at ${shown(route.landing.time)}`;
-  return aloft ? "has landed" : "at its base";
+  if (uav.ret) return t("flies home");
+  if (aloft && (route?.landing?.time ?? clock) > clock) return t("flies home, there at {time}", { time: route.landing.time });
+  return aloft ? t("has landed") : t("at its base");
 }
 
 /** Stops of the plan in force in the order of time. @returns {{uav: object, stop: object, place: string, begin: number}[]} */

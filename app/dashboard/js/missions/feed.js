@@ -5,6 +5,7 @@
 
 import { ApiError, json, listen } from "../api.js";
 import { get, set } from "../state.js";
+import { t } from "../texts.js";
 
 /** Of this tab, so that a reload in another view opens the mission again. */
 const OPEN = "dispatch-open-mission";
@@ -141,7 +142,7 @@ class Feed {
   #fail(error) {
     if (this.#ended) return;
     const gone = error instanceof ApiError && error.status === 404;
-    patch({ connected: false, trouble: gone ? "There is no such mission: it may have been deleted" : error.message });
+    patch({ connected: false, trouble: gone ? t("There is no such mission: it may have been deleted") : error.message });
   }
 }
 

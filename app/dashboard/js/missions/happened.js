@@ -5,6 +5,7 @@ import { labelled, showViolations } from "../fields.js";
 import { BASES, ZONES } from "../kinds.js";
 import { called } from "../plan.js";
 import { get } from "../state.js";
+import { t } from "../texts.js";
 import { drawingControls } from "../zone_form.js";
 import { FORMS } from "./event_forms.js";
 import { tell } from "./outbox.js";
@@ -12,10 +13,10 @@ import { told } from "./wording.js";
 
 /** What can happen to an item of each list: the type of the event, and what its button says. */
 const OF = {
-  uavs: [["visit_done", "Visit done"], ["reload_done", "Reload done"], ["uav_delayed", "Delayed"], ["uav_lost", "Lost"]],
-  targets: [["visit_done", "Visit done"], ["level_changed", "Urgency"], ["areas_changed", "Found otherwise"], ["area_cancelled", "Cancelled"]],
-  [BASES]: [["reload_done", "Reload done"], ["stock_changed", "Stock"]],
-  [ZONES]: [["zones_changed", "Open again"]],
+  uavs: [["visit_done", t("Visit done")], ["reload_done", t("Reload done")], ["uav_delayed", t("Delayed")], ["uav_lost", t("Lost")]],
+  targets: [["visit_done", t("Visit done")], ["level_changed", t("Urgency")], ["areas_changed", t("Found otherwise")], ["area_cancelled", t("Cancelled")]],
+  [BASES]: [["reload_done", t("Reload done")], ["stock_changed", t("Stock")]],
+  [ZONES]: [["zones_changed", t("Open again")]],
 };
 const KEYS = { uavs: "uav_id", targets: "target_id", [BASES]: "base_id", [ZONES]: "without" };
 
@@ -39,10 +40,10 @@ export class Happened {
       } }, title);
       return button;
     };
-    this.element = h("section", { class: "card", "aria-label": "What has happened", "data-testid": "mission-happened" },
-      h("h3", {}, "What has happened"), this.acts, this.place,
-      h("div", { class: "row" }, placing("targets", "areas_added", "Place a new area"), placing("uavs", "uavs_added", "Place a new UAV"), zone.button,
-        h("button", { type: "button", onclick: () => this.open("wind_changed", {}) }, "Wind")),
+    this.element = h("section", { class: "card", "aria-label": t("What has happened"), "data-testid": "mission-happened" },
+      h("h3", {}, t("What has happened")), this.acts, this.place,
+      h("div", { class: "row" }, placing("targets", "areas_added", t("Place a new area")), placing("uavs", "uavs_added", t("Place a new UAV")), zone.button,
+        h("button", { type: "button", onclick: () => this.open("wind_changed", {}) }, t("Wind"))),
       zone.steps);
   }
 
@@ -58,7 +59,7 @@ export class Happened {
     const key = `${id} ${item ? `${selection.kind} ${item.id}` : ""}`;
     if (this.acts.dataset.of === key) return;
     this.acts.dataset.of = key;
-    if (!item) return this.acts.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area, a base or a zone on the map or in a table to say what has happened to it."));
+    if (!item) return this.acts.replaceChildren(h("p", { class: "hint" }, t("Select a UAV, an area, a base or a zone on the map or in a table to say what has happened to it.")));
     const possible = OF[selection.kind].filter(([type]) => type !== "reload_done" || moment.state.problem[BASES]?.length);
     this.acts.replaceChildren(h("strong", { title: item.id }, called(item)), ...possible.map(([type, title]) =>
       h("button", { type: "button", dataset: { type }, onclick: () => this.open(type, { [KEYS[selection.kind]]: item.id }) }, title)));
@@ -68,16 +69,16 @@ export class Happened {
   open(type, given) {
     const moment = this.momentOf();
     if (!moment) return;
-    if (!get().fields) return notify("The service has not said yet which fields there are", "error");
+    if (!get().fields) return notify(t("The service has not said yet which fields there are"), "error");
     const { title, says, parts, read, danger } = FORMS[type](given, moment);
     const ahead = moment.state.clock > get().openMission.head.clock ? moment.state.clock : undefined;
     const at = h("input", { type: "number", step: "any", min: "0", name: "at", value: ahead === undefined ? "" : String(ahead) });
     const others = h("ul", { class: "violations" });
-    const send = h("button", { class: danger ? "danger" : "primary" }, "Tell");
+    const send = h("button", { class: danger ? "danger" : "primary" }, t("Tell"));
     const form = h("form", { class: "block", novalidate: true, "aria-label": title, dataset: { form: type } },
       h("h4", {}, title), says && h("p", { class: "hint" }, says), parts.map(({ element }) => element),
-      labelled("When it became known", at, { pointer: "/at", hint: "By the mission's clock; empty: now" }), others,
-      h("div", { class: "row" }, send, h("button", { type: "button", class: "quiet", onclick: () => this.close() }, "Not so")));
+      labelled(t("When it became known"), at, { pointer: "/at", hint: t("By the mission's clock; empty: now") }), others,
+      h("div", { class: "row" }, send, h("button", { type: "button", class: "quiet", onclick: () => this.close() }, t("Not so"))));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.#tell(form, send, others, { ...read(), ...(at.value === "" ? {} : { at: Number(at.value) }) });
@@ -97,7 +98,7 @@ export class Happened {
       const answer = await tell(this.id, event);
       if (form.isConnected) this.close();
       if (answer) notify(told(answer));
-      else notify("It could not be sent, and is kept: send it again below", "error");
+      else notify(t("It could not be sent, and is kept: send it again below"), "error");
     } catch (error) {
       const left = showViolations(form, error.violations ?? []);
       const lines = error.violations?.length ? left.map(({ pointer, detail }) => `${pointer} ${detail}`) : [error.message];

@@ -4,9 +4,9 @@ import { json, send } from "../api.js";
 import { h, notify, number } from "../dom.js";
 import { Fields, showViolations } from "../fields.js";
 import { get, subscribe } from "../state.js";
+import { dateText, t } from "../texts.js";
 import { openMission } from "./feed.js";
 
-const WHEN = new Intl.DateTimeFormat("en", { dateStyle: "medium", timeStyle: "medium", hourCycle: "h23" });
 /** Missions that others begin are seen so much later at most. */
 const LOOK_AGAIN_MS = 5000;
 /** Parameters of the algorithm are left to their defaults. */
@@ -17,12 +17,12 @@ export class MissionList {
   constructor() {
     this.body = h("tbody", {});
     this.says = h("p", { class: "hint", role: "status", "data-testid": "missions-status" });
-    this.more = h("button", { type: "button", class: "quiet more", hidden: true, onclick: () => void this.#load(this.cursor) }, "Show more");
+    this.more = h("button", { type: "button", class: "quiet more", hidden: true, onclick: () => void this.#load(this.cursor) }, t("Show more"));
     this.form = h("div", {});
     this.element = h("div", { class: "block" }, this.form,
-      h("section", { class: "card" }, h("h3", {}, "Missions of the service"), this.says,
-        h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Missions" }, h("table", { "data-testid": "missions" },
-          h("thead", {}, h("tr", {}, ["Mission", "Clock", "Begun"].map((title, at) => h("th", { scope: "col", class: at === 1 ? "n" : null }, title)), h("td", {}))), this.body)), this.more));
+      h("section", { class: "card" }, h("h3", {}, t("Missions of the service")), this.says,
+        h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": t("Missions") }, h("table", { "data-testid": "missions" },
+          h("thead", {}, h("tr", {}, [t("Mission"), t("Clock"), t("Begun")].map((title, at) => h("th", { scope: "col", class: at === 1 ? "n" : null }, title)), h("td", {}))), this.body)), this.more));
     subscribe(["fields", "problem", "answer", "answerProblem"], () => this.#drawForm());
     this.#drawForm();
   }
@@ -52,16 +52,16 @@ export class MissionList {
       }
       this.cursor = page.next_cursor;
       this.more.hidden = page.next_cursor === null;
-      this.says.textContent = this.body.childElementCount ? "The newest first." : "There is none yet.";
+      this.says.textContent = this.body.childElementCount ? t("The newest first.") : t("There is none yet.");
     } catch (error) {
-      this.says.textContent = `They cannot be listed: ${error.message}`;
+      this.says.textContent = t("They cannot be listed: {why}", { why: error.message });
     }
   }
 
   #row({ id, name, clock, created_at: begun, searching }) {
     const title = name ?? id.slice(0, 8);
     const remove = async () => {
-      if (!confirm(`Delete mission ${title} with all that is kept of it?`)) return;
+      if (!confirm(t("Delete mission {mission} with all that is kept of it?", { mission: title }))) return;
       try {
         await send(`missions/${id}`, { method: "DELETE" });
       } catch (error) {
@@ -70,9 +70,9 @@ export class MissionList {
       await this.#load();
     };
     return h("tr", { dataset: { mission: id } },
-      h("th", { scope: "row", title: id }, h("button", { type: "button", class: "quiet", "aria-label": `Open mission ${title}`, onclick: () => openMission(id) }, title), searching && h("span", { class: "chip" }, "searching")),
-      h("td", { class: "n" }, number(clock)), h("td", {}, h("time", { datetime: begun }, WHEN.format(new Date(begun)))),
-      h("td", {}, h("button", { type: "button", class: "quiet danger", "aria-label": `Delete mission ${title}`, onclick: () => void remove() }, "Delete")));
+      h("th", { scope: "row", title: id }, h("button", { type: "button", class: "quiet", "aria-label": t("Open mission {mission}", { mission: title }), onclick: () => openMission(id) }, title), searching && h("span", { class: "chip" }, t("searching"))),
+      h("td", { class: "n" }, number(clock)), h("td", {}, h("time", { datetime: begun }, dateText(begun))),
+      h("td", {}, h("button", { type: "button", class: "quiet danger", "aria-label": t("Delete mission {mission}", { mission: title }), onclick: () => void remove() }, t("Delete"))));
   }
 
   #drawForm() {
@@ -83,22 +83,22 @@ export class MissionList {
     this.planLabel ??= h("span", {});
     this.plan.disabled = !current;
     this.plan.checked = current;
-    this.planLabel.textContent = current ? "The plan on screen is in force at first" : "No plan on screen answers this problem: nobody flies at first";
+    this.planLabel.textContent = current ? t("The plan on screen is in force at first") : t("No plan on screen answers this problem: nobody flies at first");
     if (this.fields) {
-      this.title.textContent = `Begin a mission with ${problemName}`;
+      this.title.textContent = t("Begin a mission with {problem}", { problem: problemName });
       return;
     }
     const own = Object.fromEntries(Object.entries(fields.mission).filter(([name]) => !LEFT_OUT.has(name)));
-    this.fields = new Fields(own, { pointer: "", titles: { plans: "Better plans" } });
+    this.fields = new Fields(own, { pointer: "", titles: { plans: t("Better plans") } });
     const [name, ...others] = this.fields.fields;
     const rest = others.filter(({ name: field }) => field === "plans" || field === "time_limit_s");
     const further = others.filter((field) => !rest.includes(field));
-    this.title = h("h3", {}, `Begin a mission with ${problemName}`);
+    this.title = h("h3", {}, t("Begin a mission with {problem}", { problem: problemName }));
     this.elsewhere = h("ul", { class: "violations" });
-    const start = h("button", { class: "primary" }, "Begin the mission");
+    const start = h("button", { class: "primary" }, t("Begin the mission"));
     const form = h("form", { class: "card", id: "mission-form", novalidate: true }, this.title, name.element, rest.map(({ element }) => element),
       h("label", { class: "inline" }, this.plan, this.planLabel),
-      h("details", {}, h("summary", {}, "How it is planned"), h("div", { class: "fields" }, further.map(({ element }) => element))),
+      h("details", {}, h("summary", {}, t("How it is planned")), h("div", { class: "fields" }, further.map(({ element }) => element))),
       this.elsewhere, h("div", { class: "row" }, start));
     form.addEventListener("submit", (event) => {
       event.preventDefault();

@@ -2,16 +2,17 @@
 
 import { h } from "../dom.js";
 import { Portions } from "../portions.js";
+import { t } from "../texts.js";
 
 /** A table in a box that scrolls. */
 export class LiveTable {
-  /** @param {string} name @param {[string, boolean?][]} titles of the columns, and whether they have numbers */
-  constructor(name, titles) {
+  /** @param {string} name for the page's code @param {string} label @param {[string, boolean?][]} titles of the columns, and whether they have numbers */
+  constructor(name, label, titles) {
     this.columns = String(titles.length);
     this.body = h("tbody", {});
     this.count = 0;
     const head = ([title, numeric]) => h(title ? "th" : "td", { scope: title ? "col" : null, class: numeric ? "n" : null }, title);
-    this.element = h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": name },
+    this.element = h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label },
       h("table", { "data-testid": `mission-${name}` }, h("thead", {}, h("tr", {}, titles.map(head))), this.body));
   }
 
@@ -20,7 +21,7 @@ export class LiveTable {
     const fresh = h("tbody", {});
     const portions = new Portions(fresh, items, row, (button) => h("tr", {}, h("td", { colspan: this.columns }, button)));
     portions.upTo(Math.min(this.portions?.count ?? 0, items.length));
-    if (!items.length) fresh.append(h("tr", {}, h("td", { colspan: this.columns, class: "hint" }, "None.")));
+    if (!items.length) fresh.append(h("tr", {}, h("td", { colspan: this.columns, class: "hint" }, t("None."))));
     const [before, after] = [[...this.body.rows], [...fresh.rows]];
     const focus = this.#focus();
     if (before.length === after.length && before.every((old, at) => keyOf(old) === keyOf(after[at]))) {

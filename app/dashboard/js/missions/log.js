@@ -2,6 +2,7 @@
 
 import { h, notify, number } from "../dom.js";
 import { get } from "../state.js";
+import { t } from "../texts.js";
 import { readEarlier } from "./feed.js";
 import { drop, tellAgain, untoldOf } from "./outbox.js";
 import { effectOf, happened } from "./wording.js";
@@ -14,8 +15,8 @@ export class Log {
   constructor() {
     this.rows = new Map();
     this.list = h("ol", { class: "log", "data-testid": "mission-log" });
-    this.more = h("button", { type: "button", class: "quiet more", onclick: () => void this.#earlier() }, "Show earlier events");
-    this.element = h("section", { class: "card", "aria-label": "History" }, h("h3", {}, "History"), this.list, this.more);
+    this.more = h("button", { type: "button", class: "quiet more", onclick: () => void this.#earlier() }, t("Show earlier events"));
+    this.element = h("section", { class: "card", "aria-label": t("History") }, h("h3", {}, t("History")), this.list, this.more);
   }
 
   /** @param {object} mission as the store has it */
@@ -59,14 +60,14 @@ function linesOf(events) {
 function row(entry, others) {
   const effect = effectOf(entry);
   return h("li", { class: entry.effect?.flyable === false ? "broken" : null, dataset: { number: entry.number, type: entry.type } },
-    h("span", { class: "hint" }, number(entry.at), " "), happened(entry), others > 0 && h("span", { class: "hint" }, ` and ${others} before`), effect && h("p", { class: "hint" }, effect));
+    h("span", { class: "hint" }, number(entry.at), " "), happened(entry), others > 0 && h("span", { class: "hint" }, " ", t("and {count} before", { count: others })), effect && h("p", { class: "hint" }, effect));
 }
 
 /** The card of what was not sent; hidden where there is none of the mission. */
 export function untoldCard() {
   const list = h("ul", { class: "log" });
-  const element = h("section", { class: "card warning", "aria-label": "Not sent", "data-testid": "mission-untold", hidden: true },
-    h("h3", {}, "Not sent"), h("p", {}, "The service has not got these. They are kept by this browser, and count once, however often they are sent."), list);
+  const element = h("section", { class: "card warning", "aria-label": t("Not sent"), "data-testid": "mission-untold", hidden: true },
+    h("h3", {}, t("Not sent")), h("p", {}, t("The service has not got these. They are kept by this browser, and count once, however often they are sent.")), list);
   let drawn = null;
   const draw = () => {
     const { openMission } = get();
@@ -75,8 +76,8 @@ export function untoldCard() {
     if (key === drawn) return;
     drawn = key;
     element.hidden = !entries.length;
-    list.replaceChildren(...entries.map(({ id, event, why }) => h("li", { dataset: { untold: id } }, happened({ type: event.type, event }), h("p", { class: "hint" }, why || "It is not known whether it was sent"),
-      h("div", { class: "row" }, h("button", { type: "button", onclick: () => void tellAgain(id) }, "Send again"), h("button", { type: "button", class: "quiet danger", onclick: () => drop(id) }, "Discard")))));
+    list.replaceChildren(...entries.map(({ id, event, why }) => h("li", { dataset: { untold: id } }, happened({ type: event.type, event }), h("p", { class: "hint" }, why || t("It is not known whether it was sent")),
+      h("div", { class: "row" }, h("button", { type: "button", onclick: () => void tellAgain(id) }, t("Send again")), h("button", { type: "button", class: "quiet danger", onclick: () => drop(id) }, t("Discard"))))));
   };
   return { element, draw };
 }

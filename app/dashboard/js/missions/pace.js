@@ -2,6 +2,7 @@
 
 import { ApiError, json } from "../api.js";
 import { get } from "../state.js";
+import { t } from "../texts.js";
 import { eventId } from "./outbox.js";
 
 const STORE = "dispatch-pace";
@@ -54,7 +55,7 @@ async function tick() {
     if (error.status === 404) return halt();
     const behind = error instanceof ApiError && error.violations.some(({ pointer }) => pointer === "/at");
     if (behind) await catchUp(mission, seconds);
-    else told(`The clock stands: ${error.message}. It is tried again.`);
+    else told(t("The clock stands: {why}. It is tried again.", { why: error.message }));
   }
   if (pace()?.mission === mission) goOn();
 }

@@ -1,17 +1,18 @@
 /** Plans that were proposed for a mission: what each changes and gains, to accept or to refuse. */
 
 import { amounts, h, notify, number } from "../dom.js";
-import { names } from "../plan.js";
+import { baseName, names } from "../plan.js";
 import { get } from "../state.js";
+import { t, tn, tNodes } from "../texts.js";
 import { brought } from "./doing.js";
 import { tell } from "./outbox.js";
 import { told } from "./wording.js";
 
 const SAYS = {
-  open: "Waits for an answer",
-  accepted: "Was accepted",
-  refused: "Was refused",
-  outdated: "Outdated: something has happened since, and another plan is looked for",
+  open: t("Waits for an answer"),
+  accepted: t("Was accepted"),
+  refused: t("Was refused"),
+  outdated: t("Outdated: something has happened since, and another plan is looked for"),
 };
 
 /** The card of proposals. */
@@ -23,7 +24,7 @@ export class Proposals {
     this.drawn = null;
     this.says = h("p", { class: "hint", role: "status", "data-testid": "mission-planning" });
     this.place = h("div", { class: "block" });
-    this.element = h("section", { class: "card", "aria-label": "Proposals", "data-testid": "mission-proposals" }, h("h3", {}, "Proposals"), this.says, this.place);
+    this.element = h("section", { class: "card", "aria-label": t("Proposals"), "data-testid": "mission-proposals" }, h("h3", {}, t("Proposals")), this.says, this.place);
   }
 
   /** @param {object} mission as the store has it */
@@ -38,8 +39,8 @@ export class Proposals {
     const others = proposals.filter((each) => each !== open);
     this.place.replaceChildren(...[
       open && this.#openOne(open, plan, head.state.problem),
-      others.length > 0 && h("details", {}, h("summary", {}, `${others.length} earlier`), h("ul", { class: "log" }, others.map((each) =>
-        h("li", { dataset: { proposal: each.number, status: each.status } }, `Plan ${each.number}, gained `, number(each.gained), ". ", h("span", { class: "hint" }, `${SAYS[each.status]}.`))))),
+      others.length > 0 && h("details", {}, h("summary", {}, tn(others.length, "{count} earlier", "{count} earlier")), h("ul", { class: "log" }, others.map((each) =>
+        h("li", { dataset: { proposal: each.number, status: each.status } }, tNodes("Plan {plan}, gained {reward}.", { plan: each.number, reward: number(each.gained) }), " ", h("span", { class: "hint" }, `${SAYS[each.status]}.`))))),
     ].filter(Boolean));
   }
 
@@ -52,22 +53,22 @@ export class Proposals {
 
   #openOne(proposal, plan, problem) {
     const nameOf = names(problem.targets);
-    const place = (stop) => (stop.target_id ? nameOf(stop.target_id) : `base ${stop.base_id}`);
-    const list = (stops) => (stops.length ? stops.map(place).join(" → ") : "home");
+    const place = (stop) => (stop.target_id ? nameOf(stop.target_id) : baseName(stop.base_id));
+    const list = (stops) => (stops.length ? stops.map(place).join(" → ") : t("home"));
     const { uavs, visits_changed: changed } = proposal.differences;
     const [now, then] = [brought(plan), brought(proposal)];
     const moved = problem.targets.filter(({ id }) => String(now.get(id)) !== String(then.get(id)));
     const nothing = problem.targets[0].loadlist.map(() => 0);
     const act = (title, type, look) => h("button", { type: "button", class: look, onclick: (event) => void this.#answer(event.target, type, proposal.number) }, title);
-    const seen = h("button", { type: "button", "aria-pressed": String(this.seen === proposal.number), onclick: () => this.show(this.seen === proposal.number ? null : proposal.number) }, "Show it on the map");
+    const seen = h("button", { type: "button", "aria-pressed": String(this.seen === proposal.number), onclick: () => this.show(this.seen === proposal.number ? null : proposal.number) }, t("Show it on the map"));
     return h("div", { class: "block", dataset: { proposal: proposal.number, status: "open" } },
-      h("p", {}, `Plan ${proposal.number} earns `, h("strong", {}, number(proposal.gained)), ` more than the plan in force, and changes ${changed} ${changed === 1 ? "visit" : "visits"}.`),
-      h("div", { class: "row" }, act("Accept", "proposal_accepted", "primary"), act("Refuse", "proposal_refused", ""), seen),
-      h("details", { open: true }, h("summary", {}, `Stops of ${uavs.length} ${uavs.length === 1 ? "UAV" : "UAVs"}`),
-        h("table", { "data-testid": "proposal-stops" }, head(["UAV", "In force", "Proposed"]), h("tbody", {}, uavs.map((each) =>
+      h("p", {}, tNodes("Plan {plan} earns {reward} more than the plan in force, and changes {visits}.", { plan: proposal.number, reward: h("strong", {}, number(proposal.gained)), visits: tn(changed, "{count} visit", "{count} visits") })),
+      h("div", { class: "row" }, act(t("Accept"), "proposal_accepted", "primary"), act(t("Refuse"), "proposal_refused", ""), seen),
+      h("details", { open: true }, h("summary", {}, tn(uavs.length, "Stops of {count} UAV", "Stops of {count} UAVs")),
+        h("table", { "data-testid": "proposal-stops" }, head([t("UAV"), t("In force"), t("Proposed")]), h("tbody", {}, uavs.map((each) =>
           h("tr", { dataset: { uav: each.uav_id } }, h("th", { scope: "row" }, each.uav_id), h("td", { class: "wide" }, list(each.before)), h("td", { class: "wide" }, list(each.after))))))),
-      h("details", {}, h("summary", {}, `What ${moved.length} ${moved.length === 1 ? "area gets" : "areas get"}`),
-        h("table", { "data-testid": "proposal-areas" }, head(["Area", "In force", "Proposed"]), h("tbody", {}, moved.map(({ id }) =>
+      h("details", {}, h("summary", {}, tn(moved.length, "What {count} area gets", "What {count} areas get")),
+        h("table", { "data-testid": "proposal-areas" }, head([t("Area"), t("In force"), t("Proposed")]), h("tbody", {}, moved.map(({ id }) =>
           h("tr", { dataset: { area: id } }, h("th", { scope: "row" }, nameOf(id)), h("td", {}, amounts(now.get(id) ?? nothing)), h("td", {}, amounts(then.get(id) ?? nothing))))))));
   }
 
@@ -75,7 +76,7 @@ export class Proposals {
     button.disabled = true;
     try {
       const answer = await tell(get().openMission.id, { type, proposal });
-      notify(answer ? told(answer) : "It could not be sent, and is kept: send it again below", answer ? "info" : "error");
+      notify(answer ? told(answer) : t("It could not be sent, and is kept: send it again below"), answer ? "info" : "error");
     } catch (error) {
       notify(error.message, "error");
     } finally {
@@ -89,8 +90,8 @@ function head(titles) {
 }
 
 function saysOf({ searching, trouble, planning }, proposals) {
-  if (trouble) return `The newest search failed: ${trouble.detail}. The plan in force stays.`;
-  if (searching) return `${planning.algorithm} looks for a better plan.`;
-  if (proposals.some(({ status }) => status === "open")) return "A better plan was found.";
-  return planning.plans === "automatic" ? "Better plans take effect by themselves." : "No better plan is known.";
+  if (trouble) return t("The newest search failed: {why}. The plan in force stays.", { why: trouble.detail });
+  if (searching) return t("{algorithm} looks for a better plan.", { algorithm: planning.algorithm });
+  if (proposals.some(({ status }) => status === "open")) return t("A better plan was found.");
+  return planning.plans === "automatic" ? t("Better plans take effect by themselves.") : t("No better plan is known.");
 }

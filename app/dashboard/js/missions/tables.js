@@ -3,9 +3,10 @@
 import { stockText } from "../bases.js";
 import { amounts, h, number, shortAmounts, shown } from "../dom.js";
 import { BASES } from "../kinds.js";
-import { called, placeNames, rangeLeft } from "../plan.js";
+import { baseName, called, placeNames, rangeLeft } from "../plan.js";
 import { select } from "../state.js";
 import { isReload } from "../stops.js";
+import { t } from "../texts.js";
 import { brought, doing, stopsAhead } from "./doing.js";
 import { LiveTable } from "./live_table.js";
 
@@ -15,7 +16,7 @@ function nameCell(kind, item) {
 
 /** UAVs: what each does, what it has left and aboard, when it was seen last. */
 function uavs() {
-  const table = new LiveTable("UAVs", [["UAV"], ["Doing"], ["Range left", true], ["Load", true], ["Seen", true]]);
+  const table = new LiveTable("UAVs", t("UAVs"), [[t("UAV")], [t("Doing")], [t("Range left"), true], [t("Load"), true], [t("Seen"), true]]);
   const draw = ({ state, plan }, positions) => {
     const nameOf = placeNames(state.problem);
     const routes = new Map(plan.routes.map((route) => [route.uav_id, route]));
@@ -26,12 +27,12 @@ function uavs() {
         h("td", { class: "n" }, positions[uav.id] ? number(positions[uav.id].time) : "–"));
     });
   };
-  return { title: "UAVs", open: true, table, draw };
+  return { title: t("UAVs"), open: true, table, draw };
 }
 
 /** Stops of the plan in force, the next one first. */
 function ahead(tellOf) {
-  const table = new LiveTable("stops ahead", [["At", true], ["UAV"], ["Stop"], ["Brings", true], [""]]);
+  const table = new LiveTable("stops ahead", t("Stops ahead"), [[t("At"), true], [t("UAV")], [t("Stops at")], [t("Brings"), true], [""]]);
   const draw = ({ state, plan }) => {
     const nameOf = placeNames(state.problem);
     table.show(stopsAhead(state.problem, plan), ({ uav, stop, place, begin }) => {
@@ -39,51 +40,51 @@ function ahead(tellOf) {
       const given = isReload(stop) ? ["reload_done", { uav_id: uav.id, base_id: stop.base_id, amounts: uav.loadlist.map((amount, k) => amount + stop.loaded[k]) }]
         : ["visit_done", { uav_id: uav.id, target_id: stop.target_id, amounts: stop.delivered }];
       return h("tr", { dataset: { uav: uav.id, stop: stop.target_id ?? stop.base_id, exact: String(given[1].amounts) } }, h("td", { class: "n" }, number(begin)), nameCell("uavs", uav),
-        h("td", {}, nameOf(place), committed && h("span", { class: "chip" }, "under way")), h("td", { class: "n" }, isReload(stop) ? `loads ${shortAmounts(stop.loaded)}` : shortAmounts(stop.delivered)),
-        h("td", {}, h("button", { type: "button", class: "quiet", "aria-label": `${called(uav)} at ${nameOf(place)} is done`, onclick: () => tellOf(...given) }, "Done")));
+        h("td", {}, nameOf(place), committed && h("span", { class: "chip" }, t("under way"))), h("td", { class: "n" }, isReload(stop) ? t("loads {amounts}", { amounts: shortAmounts(stop.loaded) }) : shortAmounts(stop.delivered)),
+        h("td", {}, h("button", { type: "button", class: "quiet", "aria-label": t("{uav} at {place} is done", { uav: called(uav), place: nameOf(place) }), onclick: () => tellOf(...given) }, t("Done"))));
     });
   };
-  return { title: "Stops ahead", open: true, table, draw };
+  return { title: t("Stops ahead"), open: true, table, draw };
 }
 
 /** Stops that are over, the newest first: as planned until they are reported. */
 function done(tellOf) {
-  const table = new LiveTable("stops done", [["At", true], ["UAV"], ["Stop"], ["Amounts", true], [""]]);
+  const table = new LiveTable("stops done", t("Stops done"), [[t("At"), true], [t("UAV")], [t("Stops at")], [t("Amounts"), true], [""]]);
   const draw = ({ state }) => {
     const nameOf = placeNames(state.problem);
     const known = new Map(state.problem.uavs.map((uav) => [uav.id, uav]));
     table.show(state.done.toReversed(), (each) => {
-      const at = each.target_id ? nameOf(each.target_id) : `base ${each.base_id}`;
+      const at = each.target_id ? nameOf(each.target_id) : baseName(each.base_id);
       const uav = known.get(each.uav_id);
       const open = () => (each.target_id ? tellOf("visit_done", each) : tellOf("reload_done", { uav_id: each.uav_id, base_id: each.base_id }));
       return h("tr", { dataset: { uav: each.uav_id, stop: each.target_id ?? each.base_id, exact: String(each.amounts) } }, h("td", { class: "n" }, number(each.time)), nameCell("uavs", uav), h("td", {}, at), h("td", { class: "n" }, shortAmounts(each.amounts)),
-        h("td", {}, each.reported ? h("span", { class: "chip good" }, "reported")
-          : h("button", { type: "button", class: "quiet", "aria-label": `Report ${called(uav)} at ${at}`, onclick: open }, "as planned")));
+        h("td", {}, each.reported ? h("span", { class: "chip good" }, t("reported"))
+          : h("button", { type: "button", class: "quiet", "aria-label": t("Report {uav} at {place}", { uav: called(uav), place: at }), onclick: open }, t("as planned"))));
     });
   };
-  return { title: "Stops done", open: false, table, draw };
+  return { title: t("Stops done"), open: false, table, draw };
 }
 
 /** Areas: what each needs still, of what it asked for, and what the plan brings. */
 function areas() {
-  const table = new LiveTable("areas", [["Area"], ["Urgency", true], ["Still needed", true], ["Plan brings", true]]);
+  const table = new LiveTable("areas", t("Areas"), [[t("Area")], [t("Urgency"), true], [t("Still needed"), true], [t("Plan brings"), true]]);
   const draw = ({ state, plan }) => {
     const coming = brought(plan);
     const cancelled = new Set(state.cancelled);
     table.show(state.problem.targets, (target) =>
       h("tr", { class: cancelled.has(target.id) ? "lost" : null, dataset: { area: target.id } }, nameCell("targets", target), h("td", { class: "n" }, number(target.level)),
-        h("td", { class: "n wide" }, amounts(target.loadlist), target.requested && h("span", { class: "hint" }, ` of ${shortAmounts(target.requested)}`)),
-        h("td", { class: "n" }, cancelled.has(target.id) ? "cancelled" : coming.has(target.id) ? amounts(coming.get(target.id)) : "–")));
+        h("td", { class: "n wide" }, amounts(target.loadlist), target.requested && h("span", { class: "hint" }, " ", t("of {amounts}", { amounts: shortAmounts(target.requested) }))),
+        h("td", { class: "n" }, cancelled.has(target.id) ? t("cancelled") : coming.has(target.id) ? amounts(coming.get(target.id)) : "–")));
   };
-  return { title: "Areas", open: false, table, draw };
+  return { title: t("Areas"), open: false, table, draw };
 }
 
 /** Bases and what they have in stock. */
 function bases() {
-  const table = new LiveTable("bases", [["Base"], ["Stock", true], ["Turnaround", true]]);
+  const table = new LiveTable("bases", t("Bases"), [[t("Base")], [t("Stock"), true], [t("Turnaround"), true]]);
   const draw = ({ state: { problem } }) => table.show(problem[BASES] ?? [], (base) =>
     h("tr", { dataset: { base: base.id } }, nameCell(BASES, base), h("td", { class: "n" }, stockText(base.stock)), h("td", { class: "n" }, shown(base.turnaround ?? 0))));
-  return { title: "Bases", open: false, table, draw };
+  return { title: t("Bases"), open: false, table, draw };
 }
 
 /**

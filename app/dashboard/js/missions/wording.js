@@ -1,28 +1,31 @@
 /** Events of a mission and what they did, in words. */
 
-import { shown, shortAmounts } from "../dom.js";
+import { shortAmounts } from "../dom.js";
+import { baseName } from "../plan.js";
+import { listed, t, tn } from "../texts.js";
 
-const stopOf = (each) => each.target_id ?? `base ${each.base_id}`;
+const stopOf = (each) => each.target_id ?? baseName(each.base_id);
+const idsOf = (items) => listed(items.map(({ id }) => id));
 
 const SAYS = {
-  begun: () => "The mission began",
-  telemetry: ({ positions }) => `${positions.length} ${positions.length === 1 ? "position" : "positions"}`,
-  clock: () => "Time has passed",
-  visit_done: (event) => `${event.uav_id} visited ${event.target_id}, unloaded ${shortAmounts(event.delivered)}`,
-  reload_done: (event) => `${event.uav_id} reloaded at ${event.base_id}`,
-  uav_lost: (event) => `${event.uav_id} is lost`,
-  uavs_added: ({ uavs }) => `New: ${uavs.map(({ id }) => id).join(", ")}`,
-  uav_delayed: (event) => `${event.uav_id} is delayed until ${shown(event.until)}`,
-  areas_added: ({ targets }) => `New: ${targets.map(({ id }) => id).join(", ")}`,
-  areas_changed: ({ targets }) => `Found otherwise: ${targets.map(({ id }) => id).join(", ")}`,
-  area_cancelled: (event) => `${event.target_id} is cancelled`,
-  level_changed: (event) => `Urgency of ${event.target_id} is ${shown(event.level)}`,
-  stock_changed: (event) => `Stock of ${event.base_id}: ${event.stock ? shortAmounts(event.stock) : "as much as is asked for"}`,
-  zones_changed: ({ no_fly_zones: zones }) => `No-fly zones: ${zones.length || "none"}`,
-  wind_changed: ({ wind }) => (wind ? `Wind ${shown(wind.speed)} towards ${shown(wind.towards)}°` : "Still air"),
-  plan_proposed: (_, number) => `Plan ${number} is proposed`,
-  proposal_accepted: (event) => `Plan ${event.proposal} is accepted`,
-  proposal_refused: (event) => `Plan ${event.proposal} is refused`,
+  begun: () => t("The mission began"),
+  telemetry: ({ positions }) => tn(positions.length, "{count} position", "{count} positions"),
+  clock: () => t("Time has passed"),
+  visit_done: (event) => t("{uav} visited {area}, unloaded {amounts}", { uav: event.uav_id, area: event.target_id, amounts: shortAmounts(event.delivered) }),
+  reload_done: (event) => t("{uav} reloaded at {base}", { uav: event.uav_id, base: event.base_id }),
+  uav_lost: (event) => t("{uav} is lost", { uav: event.uav_id }),
+  uavs_added: ({ uavs }) => t("New: {items}", { items: idsOf(uavs) }),
+  uav_delayed: (event) => t("{uav} is delayed until {until}", { uav: event.uav_id, until: event.until }),
+  areas_added: ({ targets }) => t("New: {items}", { items: idsOf(targets) }),
+  areas_changed: ({ targets }) => t("Found otherwise: {items}", { items: idsOf(targets) }),
+  area_cancelled: (event) => t("{area} is cancelled", { area: event.target_id }),
+  level_changed: (event) => t("Urgency of {area} is {level}", { area: event.target_id, level: event.level }),
+  stock_changed: (event) => t("Stock of {base}: {amounts}", { base: event.base_id, amounts: event.stock ? shortAmounts(event.stock) : t("as much as is asked for") }),
+  zones_changed: ({ no_fly_zones: zones }) => (zones.length ? t("No-fly zones: {count}", { count: zones.length }) : t("No-fly zones: none")),
+  wind_changed: ({ wind }) => (wind ? t("Wind {speed} towards {direction}°", { speed: wind.speed, direction: wind.towards }) : t("Still air")),
+  plan_proposed: (_, number) => t("Plan {plan} is proposed", { plan: number }),
+  proposal_accepted: (event) => t("Plan {plan} is accepted", { plan: event.proposal }),
+  proposal_refused: (event) => t("Plan {plan} is refused", { plan: event.proposal }),
 };
 
 /** What has happened. @param {{type: string, event: object, number: number}} entry of the history, or an event that was not sent */
@@ -32,16 +35,16 @@ export function happened({ type, event, number }) {
 
 /** What it did to the plan in force; empty where it did nothing. */
 export function effectOf({ effect, passed_over: passed }) {
-  if (passed) return `${passed} ${passed === 1 ? "was" : "were"} older than what is known`;
+  if (passed) return tn(passed, "{count} was older than what is known", "{count} were older than what is known");
   if (!effect) return "";
-  const broken = effect.broken.map((each) => `${each.uav_id} does not stop at ${stopOf(each)}: ${each.says}`);
-  const late = effect.late.map((each) => `${each.uav_id} is at ${stopOf(each)} at ${shown(each.arrival_time)}, not ${shown(each.planned)}`);
+  const broken = effect.broken.map((each) => t("{uav} does not stop at {place}: {why}", { uav: each.uav_id, place: stopOf(each), why: each.says }));
+  const late = effect.late.map((each) => t("{uav} is at {place} at {time}, not {planned}", { uav: each.uav_id, place: stopOf(each), time: each.arrival_time, planned: each.planned }));
   return [...broken, ...late].join("; ");
 }
 
 /** What is said of an event that was just told. */
 export function told(entry) {
   const { effect } = entry;
-  const plan = effect?.flyable === false ? `${effect.broken.length} ${effect.broken.length === 1 ? "stop was" : "stops were"} dropped from the plan` : "the plan can be flown as it is";
+  const plan = effect?.flyable === false ? tn(effect.broken.length, "{count} stop was dropped from the plan", "{count} stops were dropped from the plan") : t("the plan can be flown as it is");
   return `${happened(entry)}: ${plan}`;
 }

@@ -1,12 +1,15 @@
 /** The library of source tasks: pictures, metrics, similarity to the problem on screen; registering, training. */
 
+import { statusName } from "../allocation.js";
 import { json, send } from "../api.js";
 import { drawCurves } from "../curve.js";
-import { h, notify, number, shown } from "../dom.js";
+import { h, notify, number } from "../dom.js";
 import { registerView } from "../registry.js";
 import { finished } from "../running.js";
+import { areaCount, uavCount } from "../sizes.js";
 import { get, subscribe } from "../state.js";
 import { taskPicture } from "../task_picture.js";
+import { listed, t, tn } from "../texts.js";
 
 const PAGE = 24;
 
@@ -14,42 +17,42 @@ let parts = null;
 let shownAt = 0;
 const tasks = new Map(); // id → the policy with its task
 
-registerView({ id: "library", title: "Library", order: 60, layout: "page", mount, show: () => void load() });
+registerView({ id: "library", title: t("Library"), order: 60, layout: "page", mount, show: () => void load() });
 
 function mount(root) {
   parts = {
     status: h("p", { class: "muted", role: "status", "data-testid": "library-status" }),
     cards: h("div", { class: "policies", "data-testid": "policies" }),
-    more: h("button", { type: "button", hidden: true, onclick: () => void load(shownAt + PAGE) }, "Show more"),
+    more: h("button", { type: "button", hidden: true, onclick: () => void load(shownAt + PAGE) }, t("Show more")),
     registerName: h("input", { name: "name", required: true, maxlength: "256" }),
-    register: h("button", { type: "submit", class: "primary" }, "Register"),
+    register: h("button", { type: "submit", class: "primary" }, t("Register")),
     registerHint: h("p", { class: "muted" }),
     trainName: h("input", { name: "name", required: true, maxlength: "256" }),
     mode: h("select", { name: "mode" },
-      h("option", { value: "paper" }, "paper: Algorithm 1"), h("option", { value: "service" }, "service: any size")),
+      h("option", { value: "paper" }, t("paper: Algorithm 1")), h("option", { value: "service" }, t("service: any size"))),
     epochs: h("input", { name: "n_epochs", type: "number", min: "1", step: "1", value: "300", required: true }),
     seed: h("input", { name: "seed", type: "number", min: "0", step: "1", value: "123", required: true }),
-    train: h("button", { type: "submit", class: "primary" }, "Train"),
-    cancel: h("button", { type: "button", class: "quiet", disabled: true }, "Cancel"),
-    progress: h("progress", { max: "1", value: "0", hidden: true, "aria-label": "Training" }),
+    train: h("button", { type: "submit", class: "primary" }, t("Train")),
+    cancel: h("button", { type: "button", class: "quiet", disabled: true }, t("Cancel")),
+    progress: h("progress", { max: "1", value: "0", hidden: true, "aria-label": t("Training") }),
     watched: h("p", { role: "status", "data-testid": "training-status" }),
     curve: h("div", { class: "curve" }),
   };
   root.append(
-    h("h2", {}, "Library of source tasks"),
+    h("h2", {}, t("Library of source tasks")),
     h("div", { class: "two" },
       h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void register(); } },
-        h("h3", {}, "Register the policy of this allocation"),
+        h("h3", {}, t("Register the policy of this allocation")),
         parts.registerHint,
-        h("label", { class: "line" }, h("span", {}, "Name"), parts.registerName),
+        h("label", { class: "line" }, h("span", {}, t("Name")), parts.registerName),
         h("p", { class: "actions" }, parts.register)),
       h("form", { class: "card", onsubmit: (event) => { event.preventDefault(); void train(); } },
-        h("h3", {}, "Train on the problem on screen"),
+        h("h3", {}, t("Train on the problem on screen")),
         h("div", { class: "columns" },
-          h("label", {}, "Name", parts.trainName),
-          h("label", {}, "Mode", parts.mode),
-          h("label", {}, "Epochs", parts.epochs),
-          h("label", {}, "Seed", parts.seed)),
+          h("label", {}, t("Name"), parts.trainName),
+          h("label", {}, t("Mode"), parts.mode),
+          h("label", {}, t("Epochs"), parts.epochs),
+          h("label", {}, t("Seed"), parts.seed)),
         h("p", { class: "actions" }, parts.train, " ", parts.cancel),
         parts.progress, parts.watched, parts.curve)),
     parts.status, parts.cards, h("p", { class: "actions" }, parts.more));
@@ -64,12 +67,12 @@ function hint() {
   const learned = answer && learners.includes(answer.algorithm);
   parts.register.disabled = !learned;
   parts.registerHint.textContent = !answer
-    ? "There is no allocation yet."
+    ? t("There is no allocation yet.")
     : learned
-      ? `${answer.algorithm}, reward ${shown(answer.reward)}. It has a policy of its own where it was fine-tuned and allocated with “Keep what is learned”.`
-      : `${answer.algorithm} learns nothing; allocate with ${learners.join(" or ")}, and with “Keep what is learned”.`;
-  if (!parts.trainName.value) parts.trainName.value = problemName || "my task";
-  if (!parts.registerName.value) parts.registerName.value = `${problemName || "my task"}, fine-tuned`;
+      ? t("{algorithm}, reward {reward}. It has a policy of its own where it was fine-tuned and allocated with “Keep what is learned”.", answer)
+      : t("{algorithm} learns nothing; allocate with one that learns ({learners}), and with “Keep what is learned”.", { algorithm: answer.algorithm, learners: listed(learners) });
+  if (!parts.trainName.value) parts.trainName.value = problemName || t("my task");
+  if (!parts.registerName.value) parts.registerName.value = t("{task}, fine-tuned", { task: problemName || t("my task") });
 }
 
 async function load(count = Math.max(PAGE, shownAt)) {
@@ -95,7 +98,7 @@ async function load(count = Math.max(PAGE, shownAt)) {
       tasks.set(id, await json(`library/${encodeURIComponent(id)}`))));
     parts.cards.replaceChildren(...listed.map((policy, i) => card(policy, distances.get(policy.id), i)));
     parts.more.hidden = all.length <= shownAt;
-    parts.status.textContent = `${all.length} source policies, the most similar to the problem on screen first.`;
+    parts.status.textContent = tn(all.length, "{count} source policy, the most similar to the problem on screen first.", "{count} source policies, the most similar to the problem on screen first.");
   } catch (error) {
     parts.status.textContent = error.message;
   }
@@ -103,28 +106,28 @@ async function load(count = Math.max(PAGE, shownAt)) {
 
 function card(policy, distance, place) {
   const { task } = tasks.get(policy.id);
-  const size = `${policy.n_uavs} UAVs, ${policy.n_targets} areas, ${policy.n_materials} materials`;
+  const size = listed([uavCount(policy.n_uavs), areaCount(policy.n_targets), tn(policy.n_materials, "{count} material", "{count} materials")]);
   const metrics = Object.entries(policy.metrics).filter(([, value]) => typeof value === "number").slice(0, 6);
   return h("article", { class: "card policy", "data-policy": policy.id },
     h("h3", {}, policy.name),
-    taskPicture(task, { label: `Source task of ${policy.name}: ${size}` }),
+    taskPicture(task, { label: t("Source task of {policy}: {size}", { policy: policy.name, size }) }),
     h("p", { class: "chips" },
       h("span", { class: "chip" }, policy.algorithm),
       h("span", { class: "chip" }, policy.architecture),
-      place === 0 && distance !== undefined && h("span", { class: "chip good" }, "most similar")),
+      place === 0 && distance !== undefined && h("span", { class: "chip good" }, t("most similar"))),
     h("dl", { class: "pairs" },
-      h("dt", {}, "UAVs × areas × materials"), h("dd", {}, `${policy.n_uavs} × ${policy.n_targets} × ${policy.n_materials}`),
-      h("dt", {}, "Distance to this problem"), h("dd", { class: "similarity" }, distance === undefined ? "–" : number(distance)),
+      h("dt", {}, t("UAVs × areas × materials")), h("dd", {}, `${policy.n_uavs} × ${policy.n_targets} × ${policy.n_materials}`),
+      h("dt", {}, t("Distance to this problem")), h("dd", { class: "similarity" }, distance === undefined ? "–" : number(distance)),
       metrics.flatMap(([name, value]) => [h("dt", {}, name.replaceAll("_", " ")), h("dd", {}, number(value))])),
-    h("button", { type: "button", class: "quiet", "aria-label": `Delete ${policy.name}`, onclick: () => void drop(policy) }, "Delete"));
+    h("button", { type: "button", class: "quiet", "aria-label": t("Delete {item}", { item: policy.name }), onclick: () => void drop(policy) }, t("Delete")));
 }
 
 async function drop(policy) {
-  if (!confirm(`Delete ${policy.name} from the library?`)) return;
+  if (!confirm(t("Delete {policy} from the library?", { policy: policy.name }))) return;
   await said(async () => {
     await send(`library/${encodeURIComponent(policy.id)}`, { method: "DELETE" });
     tasks.delete(policy.id);
-    notify(`${policy.name} is deleted.`);
+    notify(t("{policy} is deleted.", { policy: policy.name }));
     await load();
   });
 }
@@ -133,7 +136,7 @@ async function register() {
   const { answer } = get();
   await said(async () => {
     const policy = await json("library", { method: "POST", body: { name: parts.registerName.value, job_id: answer.job_id } });
-    notify(`${policy.name} is in the library.`);
+    notify(t("{policy} is in the library.", { policy: policy.name }));
     await load();
   });
 }
@@ -148,20 +151,20 @@ async function train() {
     parts.cancel.disabled = false;
     parts.cancel.onclick = () => void said(() => json(`jobs/${job.id}`, { method: "DELETE" }));
     parts.progress.hidden = false;
-    parts.watched.textContent = "The training waits for a worker.";
+    parts.watched.textContent = t("The training waits for a worker.");
     const ended = await finished(job.id, ({ fraction, epoch, best_reward: reward }) => {
       parts.progress.value = fraction;
       if (reward === null || reward === undefined) return;
       points.push([epoch ?? points.length, reward]);
-      parts.watched.textContent = `Epoch ${epoch ?? "–"}, best reward ${shown(reward)}.`;
-      drawCurves(parts.curve, [{ name: "best reward", points }], { x: "epoch", height: 180, label: "Best reward against epochs" });
+      parts.watched.textContent = t("Epoch {epoch}, best reward {reward}.", { epoch: epoch ?? "–", reward });
+      drawCurves(parts.curve, [{ name: t("best reward"), points }], { x: t("epoch"), height: 180, label: t("Best reward against epochs") });
     });
     const id = ended.result?.policy_id;
-    parts.watched.textContent = id ? `Trained: ${body.name} is in the library as ${id}.` : `The training was ${ended.status}.`;
+    parts.watched.textContent = id ? t("Trained: {policy} is in the library as {id}.", { policy: body.name, id }) : t("The training has ended: {status}.", { status: statusName(ended.status) });
     const { history } = ended.result ?? {};
     if (history) {
-      const line = { name: "reward", points: history.epoch.map((epoch, i) => [epoch, history.reward[i]]) };
-      drawCurves(parts.curve, [line], { x: "epoch", height: 180, label: "Reward against epochs" });
+      const line = { name: t("reward"), points: history.epoch.map((epoch, i) => [epoch, history.reward[i]]) };
+      drawCurves(parts.curve, [line], { x: t("epoch"), height: 180, label: t("Reward against epochs") });
     }
     await load();
   });

@@ -1,7 +1,7 @@
 /** Missions: the list of them, and the one that is open, which several dispatchers may follow at once. */
 
 import { json } from "../api.js";
-import { h, notify, shown } from "../dom.js";
+import { h, notify } from "../dom.js";
 import { change, undo } from "../history.js";
 import { ClockCard } from "../missions/clock_card.js";
 import { asSeen } from "../missions/doing.js";
@@ -14,6 +14,7 @@ import { missionTables } from "../missions/tables.js";
 import { newOpening, normalised } from "../problem.js";
 import { registerView } from "../registry.js";
 import { get, select, set, subscribe } from "../state.js";
+import { t } from "../texts.js";
 import { timeline } from "../timeline.js";
 
 let parts = null;
@@ -25,7 +26,7 @@ let trouble = "";
 let drawn = null; // what the tables show
 let mapped = null; // what the map shows
 
-registerView({ id: "missions", title: "Missions", order: 50, layout: "panel", mount, show, hide });
+registerView({ id: "missions", title: t("Missions"), order: 50, layout: "panel", mount, show, hide });
 
 function mount(root, context) {
   map = context.map;
@@ -42,9 +43,9 @@ function mount(root, context) {
   parts.cards.append(parts.clock.element, untold.element, parts.proposals.element, parts.happened.element, parts.tables.element, parts.log.element);
   parts.body.append(
     h("div", { class: "row spread" }, parts.title, parts.link),
-    h("div", { class: "row" }, h("button", { type: "button", onclick: () => openMission(null) }, "All missions"), h("button", { type: "button", onclick: takeOver }, "Open what remains as a problem")),
+    h("div", { class: "row" }, h("button", { type: "button", onclick: () => openMission(null) }, t("All missions")), h("button", { type: "button", onclick: takeOver }, t("Open what remains as a problem"))),
     parts.says, parts.cards);
-  root.append(h("div", {}, h("h2", {}, "Missions"), list.element), parts.body);
+  root.append(h("div", {}, h("h2", {}, t("Missions")), list.element), parts.body);
   parts.overview = root.firstElementChild;
   subscribe(["openMission"], ({ openMission: now }) => {
     if (wanted && wanted.id !== now?.id) forget();
@@ -106,7 +107,7 @@ async function ask() {
       looked = { ...found, of };
       trouble = "";
     } catch (error) {
-      if (wanted?.id === last.id) trouble = `The state at ${shown(last.at)} is not known: ${error.message}.`;
+      if (wanted?.id === last.id) trouble = t("The state at {time} is not known: {why}.", { time: last.at, why: error.message });
     }
   }
   asking = false;
@@ -130,10 +131,10 @@ function draw() {
   }
   parts.says.textContent = now.trouble ?? "";
   parts.says.hidden = !now.trouble;
-  parts.link.textContent = now.connected ? "live" : "not connected";
+  parts.link.textContent = now.connected ? t("live") : t("not connected");
   parts.link.className = `chip ${now.connected ? "good" : "warn"}`;
   parts.cards.hidden = !now.head;
-  parts.title.textContent = now.head ? `Mission ${now.head.name ?? now.id.slice(0, 8)}` : "Mission";
+  parts.title.textContent = now.head ? t("Mission {name}", { name: now.head.name ?? now.id.slice(0, 8) }) : t("Mission");
   if (!now.head || !now.plan) return;
   drawMission(now);
 }
@@ -163,7 +164,8 @@ function saysOf({ head }, on) {
   if (trouble) return trouble;
   const { clock } = on.state;
   if (clock === head.clock) return "";
-  return clock > head.clock ? `This is planned for ${shown(clock)}; the mission is at ${shown(head.clock)}.` : `This is how it was at ${shown(clock)}; the mission is at ${shown(head.clock)}.`;
+  const times = { time: clock, clock: head.clock };
+  return clock > head.clock ? t("This is planned for {time}; the mission is at {clock}.", times) : t("This is how it was at {time}; the mission is at {clock}.", times);
 }
 
 /** UAVs where they are, what they are on their way to, and the plan: the one in force, or the proposal that is looked at. */
@@ -197,9 +199,9 @@ async function takeOver() {
   } catch (error) {
     return notify(error.message, "error");
   }
-  change({ problem: normalised({ ...on.state.problem, matrices }), problemName: `${name ?? id.slice(0, 8)} at ${shown(on.state.clock)}`, opened: newOpening(), answer: null, answerProblem: null, incumbent: null, selection: null });
+  change({ problem: normalised({ ...on.state.problem, matrices }), problemName: t("{mission} at {time}", { mission: name ?? id.slice(0, 8), time: on.state.clock }), opened: newOpening(), answer: null, answerProblem: null, incumbent: null, selection: null });
   set({ view: "problem" });
-  notify("What remains of the mission is open as a problem; the mission goes on by itself", "info", { title: "Undo", act: undo });
+  notify(t("What remains of the mission is open as a problem; the mission goes on by itself"), "info", { title: t("Undo"), act: undo });
 }
 
 addEventListener("online", () => { if (get().openMission) void readAgain(); });
