@@ -81,6 +81,12 @@ def test_files_that_are_named_are_there(page, modules):
     assert set(_MODULE.findall(prose(ROOT / page))) <= modules
 
 
+def test_every_page_is_in_the_navigation_of_the_site():
+    navigation = (ROOT / ".docs/mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[1]
+    entries = re.findall(r"^ +- (\S+\.md)$", navigation, re.MULTILINE)
+    assert sorted(entries) == sorted(map(str, PAGES))
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= LONGEST_README
 
