@@ -66,6 +66,7 @@ INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile --
 .venv/service: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(INSTALL) ".[client]"
+	.deploy/shrink $(BIN)/python
 	touch $@
 
 # Bytecode on all cores; pip would do that on one. What is left out is large, and nobody needs it, or one file of it.

@@ -3,12 +3,14 @@
 import asyncio
 import os
 import signal
+import subprocess
 import sys
 import threading
 from multiprocessing import forkserver
 
 import pytest
 from harness import PATIENCE_S, eventually
+from live_service import has_exited, workers_of
 
 from app.jobs.local import LocalExecutor
 
@@ -69,6 +71,34 @@ def test_workers_start_where_there_is_nothing_to_load():
         await executor.close()
 
     asyncio.run(scenario())
+
+
+def test_workers_end_with_a_service_that_is_killed():
+    program = """
+import asyncio, sys
+from app.jobs.local import LocalExecutor
+async def main():
+    executor = LocalExecutor(2, preload="forked_from")
+    await executor.start(lambda: None)
+    while executor.ready < 2:
+        await asyncio.sleep(0.01)
+    print(*(worker.pid for worker in executor._workers), flush=True)
+    await asyncio.sleep(600)
+asyncio.run(main())
+"""
+    path = os.pathsep.join(sys.path)
+    with subprocess.Popen(
+        [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE
+    ) as service:
+        workers = [int(pid) for pid in service.stdout.readline().split()]
+        assert len(workers) == 2
+        assert sorted(workers) == workers_of(service.pid)
+        service.kill()
+
+    async def all_end():
+        await eventually(lambda: all(has_exited(pid) for pid in workers))
+
+    asyncio.run(all_end())
 
 
 def test_closing_does_not_wait_for_what_is_being_loaded(tmp_path):
