@@ -91,9 +91,14 @@ def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= LONGEST_README
 
 
-def test_the_version_to_cite_is_this_one():
+def test_the_version_to_cite_is_this_one_and_the_newest_in_the_changes():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [app.__version__]
+    released = re.findall(r"^date-released: (.+)$", citation, re.MULTILINE)
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## (\d.*), (.+)$", changes, re.MULTILINE)
+    assert newest[1] == app.__version__
+    assert [newest[2]] == released
 
 
 def test_the_version_of_the_package_is_this_one():

@@ -2,9 +2,9 @@
 
     python tests/benchmarks/bench_memory.py [--workers 2]
 
-The service is started with compiled code at hand, gives one answer of the default algorithm, and waits. Of each
-of its processes is printed its own memory, its proportional share with what several have together (PSS), and
-its processor time. Linux only.
+The service is started with compiled code at hand, gives one answer of the default algorithm, and waits. Of
+each of its processes is printed its own memory, its proportional share with what several have together (PSS),
+and its processor time. Linux only.
 """
 
 from __future__ import annotations
