@@ -1,9 +1,11 @@
 # The service in one image. PyTorch's default wheel for Linux carries gigabytes of CUDA libraries that nothing here
 # needs: give the address of PyTorch's index of CPU wheels (its installation page has it), or of a mirror.
+#   docker compose -f .deploy/one-machine.yaml up --build
+# or, step by step:
 #   docker build --build-arg TORCH_INDEX=ADDRESS -t uav-allocator .
 #   docker run --rm -v allocator-data:/data uav-allocator python -m app keys create --role library --name me
 #   docker run --rm -p 8000:8000 -v allocator-data:/data uav-allocator
-# For more than one machine give the extras too, --build-arg EXTRAS=[postgres,ray]; .deploy/ has a compose file.
+# For more than one machine give the extras too, --build-arg EXTRAS=[postgres,ray]; .deploy/compose.yaml does.
 FROM python:3.11-slim
 
 ARG TORCH_INDEX=
@@ -25,11 +27,12 @@ ENV PIP_NO_CACHE_DIR=1 \
 
 WORKDIR /srv/allocator
 # What it needs comes before its code, beside an empty package, so that a change of the code installs little anew.
-COPY pyproject.toml constraints.txt LICENSE ./
+COPY pyproject.toml constraints.txt LICENSE .deploy/shrink ./
 RUN mkdir app policy_store \
     && touch README.md policy_store/__init__.py \
     && echo '__version__ = "0"' > app/__init__.py \
     && pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "$(grep '^torch==' constraints.txt)" \
+    && ./shrink python \
     && pip install --constraint constraints.txt ".$EXTRAS"
 COPY README.md ./
 COPY app ./app

@@ -6,7 +6,7 @@ BIN := .venv/bin
 # Groups of test files at a time.
 PROCESSES ?= 2
 
-.PHONY: run test lint types borders unit bench constraints clean
+.PHONY: run test lint types borders docs unit bench hooks constraints clean
 
 # Workers compile at the first start what is not compiled yet, beside the first answers.
 run: .venv/service
@@ -14,7 +14,7 @@ run: .venv/service
 
 # What looks at the code, beside what compiles it.
 test: .venv/development
-	$(MAKE) --jobs 2 --output-sync=line lint types borders .venv/compiled
+	$(MAKE) --jobs 2 --output-sync=line lint types borders docs .venv/compiled
 	$(MAKE) unit
 
 lint: .venv/development
@@ -26,6 +26,10 @@ types: .venv/development
 
 borders: .venv/development
 	$(BIN)/lint-imports
+
+# A site of all pages, in .docs/site; a broken link is an error. The variable silences advertising for a fork.
+docs: .venv/development
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file .docs/mkdocs.yml
 
 # The bytecode of tests takes each process six seconds to make, so it is kept whatever the environment says.
 unit: export PYTHONDONTWRITEBYTECODE =
@@ -44,6 +48,10 @@ bench: .venv/development
 	-$(BIN)/python tests/benchmarks/bench_overhead.py --quick
 	-$(BIN)/python tests/benchmarks/bench_lateness.py --quick
 
+# Every commit is checked from now on, as .pre-commit-config.yaml says.
+hooks: .venv/development
+	$(BIN)/pre-commit install
+
 # Pins everything, from a clean environment: run it after a change of the dependencies.
 constraints:
 	rm -rf .venv-constraints
@@ -58,6 +66,7 @@ INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile --
 .venv/service: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(INSTALL) ".[client]"
+	.deploy/shrink $(BIN)/python
 	touch $@
 
 # Bytecode on all cores; pip would do that on one. What is left out is large, and nobody needs it, or one file of it.
@@ -73,5 +82,5 @@ INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile --
 	touch $@
 
 clean:
-	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .docs/site build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find app policy_store tests -name __pycache__ -prune -exec rm -rf {} +

@@ -81,13 +81,24 @@ def test_files_that_are_named_are_there(page, modules):
     assert set(_MODULE.findall(prose(ROOT / page))) <= modules
 
 
+def test_every_page_is_in_the_navigation_of_the_site():
+    navigation = (ROOT / ".docs/mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[1]
+    entries = re.findall(r"^ +- (\S+\.md)$", navigation, re.MULTILINE)
+    assert sorted(entries) == sorted(map(str, PAGES))
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= LONGEST_README
 
 
-def test_the_version_to_cite_is_this_one():
+def test_the_version_to_cite_is_this_one_and_the_newest_in_the_changes():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.findall(r"^version: (.+)$", citation, re.MULTILINE) == [app.__version__]
+    released = re.findall(r"^date-released: (.+)$", citation, re.MULTILINE)
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## (\d.*), (.+)$", changes, re.MULTILINE)
+    assert newest[1] == app.__version__
+    assert [newest[2]] == released
 
 
 def test_the_version_of_the_package_is_this_one():

@@ -129,6 +129,12 @@ def warm_up_worker(
     return later
 
 
+def load_all() -> None:
+    """Load all compiled code, and nothing for a size of problem."""
+    for part in _PARTS.values():
+        part()
+
+
 def _prepare_default(most_uavs: int, most_targets: int, library_url: str | None) -> None:
     _load(_DEFAULT)
     if library_url is not None:

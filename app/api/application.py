@@ -72,6 +72,7 @@ _SENT_HEADERS = ("ETag", "Location", "Preference-Applied", "Retry-After", "WWW-A
 _WARM_UP = "app.allocation.warm_up:warm_up_worker"
 _WARM_UP_RESERVE = "app.allocation.warm_up:warm_up_at_once"
 _WARM_UP_JUDGE = "app.missions.judging:warm_up"
+_PRELOAD = "app.allocation.preloaded"
 _REQUEST_THREADS = 8
 _SEARCHES_LEAVE = 5
 """Niceness of the workers: a third of a core's time where somebody else has something to do on it."""
@@ -213,6 +214,7 @@ def _local(
 ) -> LocalExecutor:
     return LocalExecutor(
         slots,
+        preload=_PRELOAD,
         warm_up=warm_up,
         warm_up_arguments=arguments,
         environment=_environment(database),

@@ -24,7 +24,7 @@ from .event_stream import StreamEvent
 from .exchange import File
 from .synchronous import Client
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "AsyncClient",

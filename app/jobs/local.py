@@ -1,8 +1,13 @@
 """Work on this machine: slots, each a process pool of one worker.
 
-One worker a pool, because a pool of several fails everybody's work when one of them dies. Workers are
-spawned: a process forked after torch has run can hang. A worker that dies, busy or idle, is noticed at once,
-because its end of the progress pipe closes with it, and its slot gets a new one.
+One worker a pool, because a pool of several fails everybody's work when one of them dies. A worker that dies,
+busy or idle, is noticed at once, because its end of the progress pipe closes with it, and its slot gets a new
+one.
+
+Workers are forked from one process, multiprocessing's fork server, which has loaded what all need: they share
+that memory, and one that replaces another has it at once. What is loaded there must leave no thread behind,
+because a forked process has none but its first. Without something to load, and on other systems than Linux,
+workers are spawned.
 """
 
 from __future__ import annotations
@@ -14,12 +19,15 @@ import itertools
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, MutableSequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, InvalidStateError, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
+from multiprocessing import forkserver
+from multiprocessing.context import BaseContext
 from typing import Any, cast
 
 from app.jobs import worker
@@ -33,32 +41,55 @@ _serials = itertools.count(1)
 
 
 class LocalExecutor(Executor):
-    """Runs work in processes of this machine, which log to their standard error."""
+    """Runs work in processes of this machine, which log to their standard error.
+
+    Parameters
+    ----------
+    slots, options
+        See :class:`app.jobs.executor.Executor`.
+    preload
+        Module that loads what all workers need as it is imported. All executors of a process share one fork
+        server: it loads what the first of them names, in the environment of the first.
+    """
+
+    def __init__(self, slots: int, *, preload: str | None = None, **options: Any) -> None:
+        super().__init__(slots, **options)
+        self._preload = preload if sys.platform == "linux" else None
 
     def _new_worker(self) -> _Worker:
-        return _Worker(self._log_level, partial(worker.warm_up, *self._warm_up), self._environment)
+        warm_up = partial(worker.warm_up, *self._warm_up)
+        return _Worker(self._preload, self._log_level, warm_up, self._environment)
 
 
 class _Worker:
     """A worker process as its parent sees it: pool, progress pipe, control block."""
 
     def __init__(
-        self, log_level: str | None, warm_up: Callable[[], int], environment: Mapping[str, str]
+        self,
+        preload: str | None,
+        log_level: str | None,
+        warm_up: Callable[[], int],
+        environment: Mapping[str, str],
     ) -> None:
-        self._warm_up, self._environment = warm_up, environment
-        context = multiprocessing.get_context("spawn")
+        self._warm_up, self._forked = warm_up, preload is not None
+        context: BaseContext = multiprocessing.get_context("forkserver" if self._forked else "spawn")
+        if preload is not None:
+            forkserver.set_forkserver_preload([preload])
+            environment = {**environment, **_same_modules()}
+        self._environment = environment
         self._pipe, self._their_end = context.Pipe(duplex=False)
         self.control: MutableSequence[float] = cast(
             "MutableSequence[float]", context.RawArray(ctypes.c_double, new_control())
         )
-        initialize = partial(worker.initialize, self._their_end, self.control, log_level)
+        initialize = partial(worker.initialize, self._their_end, self.control, log_level, environment)
         self.pool = ProcessPoolExecutor(1, mp_context=context, initializer=initialize)
         self.pid: int | None = None
         self.gone = asyncio.Event()
         self._serial = 0
         self._on_progress: Callable[[Progress], None] | None = None
         self._newest: Progress | None = None
-        self._doomed = False
+        self._started: Future[Future[int]] = Future()
+        self._doomed = self._given_up = False
         self._loop = asyncio.get_running_loop()
         self._reader = threading.Thread(target=self._read, name="worker-progress", daemon=True)
 
@@ -69,9 +100,10 @@ class _Worker:
 
     async def warm_up(self) -> None:
         """Start the process and wait until it is warm."""
-        # No thread waits for it: all the warm-ups together could keep those that requests need.
-        pid = asyncio.wrap_future(await asyncio.to_thread(self._start))
-        self.pid = await pid
+        # A thread of its own: a fork server answers only when it has loaded, and requests need the others.
+        threading.Thread(target=self._start, name="worker-start", daemon=True).start()
+        starting = await asyncio.wrap_future(self._started)
+        self.pid = await asyncio.wrap_future(starting)
         if self._doomed:
             self.kill()
         await asyncio.wrap_future(self.pool.submit(self._warm_up))
@@ -80,13 +112,27 @@ class _Worker:
         """Wait until the process is gone."""
         await self.gone.wait()
 
-    def _start(self) -> Future[int]:
-        with _environment(self._environment):
-            pid = self.pool.submit(os.getpid)
-        # Once only the worker has the other end, the pipe closes when the worker dies.
-        self._their_end.close()
-        self._reader.start()
-        return pid
+    def _start(self) -> None:
+        try:
+            if self._forked:
+                with _environment(self._environment):
+                    forkserver.ensure_running()
+                pid = self.pool.submit(os.getpid)
+            else:
+                with _environment(self._environment):
+                    pid = self.pool.submit(os.getpid)
+            # Once only the worker has the other end, the pipe closes when the worker dies.
+            self._their_end.close()
+            self._reader.start()
+        except Exception as error:
+            with contextlib.suppress(InvalidStateError):
+                self._started.set_exception(error)
+            return
+        try:
+            self._started.set_result(pid)
+        except InvalidStateError:
+            # Nobody waits for it any more.
+            self._clear_away()
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the process died idle: its slot brings another."""
@@ -120,8 +166,12 @@ class _Worker:
         self.control[SHARE] = workers
 
     def kill(self) -> None:
-        """Kill the process, now or as soon as it has one."""
+        """Kill the process, now or as soon as it has one; nobody waits for one that has to be forked yet."""
         self._doomed = True
+        if self._forked:
+            with contextlib.suppress(InvalidStateError):
+                self._started.set_exception(ChildProcessError("closed before it was forked"))
+                self._given_up = True
         if self.pid is not None and not self.gone.is_set():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.pid, signal.SIGKILL)
@@ -129,7 +179,8 @@ class _Worker:
     async def discard(self) -> None:
         """Kill the process and wait for its end."""
         self.kill()
-        await asyncio.to_thread(self._clear_away)
+        if not self._given_up:
+            await asyncio.to_thread(self._clear_away)
 
     def _clear_away(self) -> None:
         self.pool.shutdown(wait=True)
@@ -153,6 +204,11 @@ class _Worker:
         if serial == self._serial and self._on_progress is not None:
             self._newest = progress
             self._on_progress(progress)
+
+
+def _same_modules() -> dict[str, str]:
+    """Return the variables by which a fork server finds modules where this process does, and nowhere else."""
+    return {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 @contextlib.contextmanager

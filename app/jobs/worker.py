@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, MutableSequence
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing.connection import Connection, wait
+from types import MappingProxyType
 from typing import Any
 
 from app.jobs.errors import describe
@@ -26,6 +27,7 @@ from app.jobs.model import Progress
 from app.jobs.stored_json import written
 from app.jobs.work_context import WorkContext
 from app.logs import configure_worker_logs, labelled
+from app.memory import give_back
 
 REPORT_INTERVAL_S = 0.05
 
@@ -103,7 +105,12 @@ def clean(progress: Progress) -> Progress:
 _equipment: list[tuple[_Reporter, MutableSequence[float]]] = []
 
 
-def initialize(pipe: Connection, control: MutableSequence[float], log_level: str | None = None) -> None:
+def initialize(
+    pipe: Connection,
+    control: MutableSequence[float],
+    log_level: str | None = None,
+    environment: Mapping[str, str] = MappingProxyType({}),
+) -> None:
     """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
 
     Parameters
@@ -114,7 +121,10 @@ def initialize(pipe: Connection, control: MutableSequence[float], log_level: str
         Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
     log_level
         What is logged at least; None: as Python does it by itself.
+    environment
+        Variables, for what reads them from now on: a forked process has those of the fork server.
     """
+    os.environ.update(environment)
     if log_level is not None:
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -150,6 +160,7 @@ def warm_up(hook: str | None, niceness: int, *arguments: Any) -> int:
     # What is there now stays: to look through it for garbage would only hold up somebody's work.
     gc.collect()
     gc.freeze()
+    give_back()
     os.nice(niceness)
     return os.getpid()
 

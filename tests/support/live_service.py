@@ -125,12 +125,12 @@ class LiveService:
 
 
 def workers_of(pid: int) -> list[int]:
-    """Return the worker processes of a server, which multiprocessing starts as spawn_main."""
-    found = []
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and _parent(folder) == pid and b"spawn_main" in _command(folder):
-            found.append(int(folder.name))
-    return sorted(found)
+    """Return the workers of a server: what its fork server has forked, and what it spawned."""
+    family = [folder for folder in Path("/proc").iterdir() if folder.name.isdigit()]
+    children = [folder for folder in family if _parent(folder) == pid]
+    servers = {int(folder.name) for folder in children if b"forkserver" in _command(folder)}
+    spawned = {int(folder.name) for folder in children if b"spawn_main" in _command(folder)}
+    return sorted(spawned | {int(folder.name) for folder in family if _parent(folder) in servers})
 
 
 def kill(pid: int) -> None:
