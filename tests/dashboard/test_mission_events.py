@@ -1,7 +1,7 @@
 """What has happened is told by clicks, and what the service says about it is on screen."""
 
 import pytest
-from dashboard_steps import state
+from dashboard_steps import go, state
 from mission_steps import SMALL, Mission, at_the_newest, newest, select, tell, without_a_mission
 from playwright.sync_api import expect
 
@@ -129,6 +129,90 @@ def test_a_zone_is_drawn_and_what_it_breaks_is_said(page, service):
     assert [each["target_id"] for each in effect["broken"]] == ["far"]
     row = page.locator("[data-testid=mission-log] li.broken").first
     expect(row).to_contain_text(f"u2 does not stop at far: {effect['broken'][0]['says']}")
+
+
+def drag(page, handle, across, down):
+    box = handle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + across, y + down, steps=4)
+    page.mouse.up()
+
+
+def test_zones_are_dragged_by_corners_and_as_a_whole_and_told_as_one_event(page, service):
+    shut = {"id": "shut", "polygon": [[20, 20], [24, 20], [24, 24], [20, 24]], "name": "Harbour"}
+    tower = {"id": "tower", "polygon": [[30, 30], [36, 30], [36, 36]]}
+    mission = Mission(service, {**SMALL, "no_fly_zones": [tower, shut]}).search_ends().open(page)
+    select(page, "no_fly_zones", "shut")
+    corner = page.locator(".corner[data-corner='2']")
+    drag(page, corner, 30, -20)
+    form = page.locator("form[data-form=zones_changed]")
+    expect(form).to_contain_text("Harbour")
+    corner.press("Alt+ArrowRight")
+    expect(corner).to_be_focused()
+    form.get_by_label("y of corner 1").fill("19.5")
+    form.get_by_label("y of corner 1").press("Enter")
+    select(page, "no_fly_zones", "tower")
+    expect(form.locator("[data-shape=shut]")).to_have_text("Harbour has 4 corners.")
+    drag(page, page.get_by_role("button", name="All of tower"), -40, 10)
+    page.get_by_role("button", name="All of tower").press("Alt+ArrowLeft")
+    # Nothing is told yet; and what others tell meanwhile is not undone.
+    other = {"id": "other", "polygon": [[40, 40], [41, 40], [41, 41]]}
+    mission.tell("other", type="zones_changed", no_fly_zones=[tower, shut, other])
+    at_the_newest(page, mission)
+    expect(form).to_be_visible()
+    tell(page)
+
+    newest(page, mission, "zones_changed")
+    expect(form).to_have_count(0)
+    told = [each for each in mission.read("/events")["events"] if each["type"] == "zones_changed"]
+    assert len(told) == 2
+    now = {zone["id"]: zone for zone in mission.read()["state"]["problem"]["no_fly_zones"]}
+    assert list(now) == ["tower", "shut", "other"]
+    assert now["other"]["polygon"] == other["polygon"]
+    assert now["shut"]["name"] == "Harbour"
+    before, after = shut["polygon"], now["shut"]["polygon"]
+    assert (after[0], after[1], after[3]) == ([20, 19.5], before[1], before[3])
+    assert after[2][0] > before[2][0]
+    assert after[2][1] > before[2][1]
+    moved = [
+        (x - tower["polygon"][n][0], y - tower["polygon"][n][1])
+        for n, (x, y) in enumerate(now["tower"]["polygon"])
+    ]
+    assert all(across < 0 and along < 0 for across, along in moved)
+    assert max(across for across, _ in moved) == pytest.approx(min(across for across, _ in moved), abs=0.05)
+    # The problem on screen is another one.
+    assert "no_fly_zones" not in state(page, "problem")
+
+
+def test_a_shape_that_is_given_up_or_crosses_itself_is_not_told(page, service):
+    page.expected_troubles.append("422")
+    square = {"id": "square", "polygon": [[20, 20], [30, 20], [30, 30], [20, 30]]}
+    mission = Mission(service, {**SMALL, "no_fly_zones": [square]}).search_ends().open(page)
+    select(page, "no_fly_zones", "square")
+    page.locator(".corner[data-corner='0']").press("Delete")
+    form = page.locator("form[data-form=zones_changed]")
+    expect(form).to_contain_text("3 corners")
+    form.get_by_role("button", name="Not so").click()
+    expect(page.locator(".corner:not(.between, .whole)")).to_have_count(4)
+    page.locator(".corner[data-corner='0']").press("Alt+ArrowDown")
+    form.get_by_label("x of corner 1").fill("40")
+    form.get_by_label("x of corner 1").press("Enter")
+    form.get_by_label("y of corner 1").fill("25")
+    form.get_by_label("y of corner 1").press("Enter")
+    expect(form.locator("#zone-fault")).to_contain_text("crosses")
+    tell(page)
+    expect(form.locator(".violations li")).to_contain_text("cross")
+    assert mission.read()["state"]["problem"]["no_fly_zones"][0]["polygon"] == square["polygon"]
+    # Back where it was, nothing is left to tell.
+    for axis in "xy":
+        form.get_by_label(f"{axis} of corner 1").fill("20")
+        form.get_by_label(f"{axis} of corner 1").press("Enter")
+    expect(form).to_have_count(0)
+    # In another view there is nothing to take hold of.
+    go(page, "problem")
+    expect(page.locator(".corner")).to_have_count(0)
 
 
 def test_what_was_filled_in_for_one_mission_is_not_told_to_another(page, service):
