@@ -53,6 +53,42 @@ def test_a_mission_that_cannot_begin_says_why(page, service):
     expect(page.locator("#mission-form .violations li").first).to_contain_text("/problem/uavs")
 
 
+def test_a_mission_whose_answer_was_lost_is_begun_once(page, service):
+    page.expected_troubles.append("ERR_FAILED")
+    keys = []
+
+    def lose_the_first_answer(route):
+        if route.request.method != "POST":
+            return route.continue_()
+        keys.append(route.request.headers["idempotency-key"])
+        if len(keys) > 1:
+            return route.continue_()
+        assert route.fetch().status == 201
+        return route.abort()
+
+    def begun():
+        listed = httpx.get(f"{service.url}/missions?limit=100").json()["missions"]
+        return [each["id"] for each in listed if each["name"] == "Only once"]
+
+    page.route("**/missions", lose_the_first_answer)
+    go(page, "missions")
+    page.locator("#mission-form input[name=name]").fill("Only once")
+    page.locator("#mission-form input[name=time_limit_s]").fill("0.2")
+    start = page.get_by_role("button", name="Begin the mission")
+    start.click()
+    expect(page.locator("#mission-form .violations li", has_text="cannot be reached")).to_be_visible()
+    start.click()
+    expect(page.locator("#view-missions h2", has_text="Mission Only once")).to_be_visible()
+    assert page.url.endswith(f"#/missions/{begun()[0]}")
+    assert len(begun()) == 1
+    # What is begun after that is another one.
+    page.get_by_role("button", name="All missions").click()
+    start.click()
+    expect(page.locator("#view-missions h2", has_text="Mission Only once")).to_be_visible()
+    assert len(begun()) == 2
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_a_mission_that_is_deleted_says_so(page, service):
     page.expected_troubles.append("404")
     mission = Mission(service).search_ends().open(page)
