@@ -101,7 +101,9 @@ def test_a_job_that_fails_says_why(client, problem):
 
 
 def test_missions_are_begun_told_of_and_replayed(client, problem):
-    mission = client.begin_mission(_task(problem), algorithm="greedy", time_limit_s=5)["id"]
+    key, planning = uuid.uuid4().hex, {"algorithm": "greedy", "time_limit_s": 5}
+    mission = client.begin_mission(_task(problem), idempotency_key=key, **planning)["id"]
+    assert client.begin_mission(_task(problem), idempotency_key=key, **planning)["id"] == mission
     seen = []
     for event in client.follow_mission(mission):
         seen.append(event)
