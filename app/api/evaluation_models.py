@@ -18,7 +18,7 @@ from app.api.problem_models import ProblemModel
 from app.api.wire_fields import Whole, WireModel
 
 MAX_FLIGHT_FILES = 10_000
-MAX_MATCH_WITHIN_M = 10_000.0
+MAX_MATCH_WITHIN_M = 1_000.0
 
 AmountsOfStops = list[list[list[Annotated[float, Field(allow_inf_nan=False)]] | None]]
 """Amounts by step, UAV and material."""

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.api.evaluation_models import AmountsOfStops, EvaluationRequest
-from app.api.plan_formats.flown_routes import PASSED_OVER, ReadFile, ReadPlan, plan_of_files
+from app.api.plan_formats.flown_routes import ReadFile, ReadPlan, plan_of_files
 from app.api.problem_models import to_problem
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record, to_record
-from app.domain.warnings import warnings_of
 from app.settings import Settings
 
 
@@ -28,8 +27,7 @@ def evaluation_payload(body: EvaluationRequest, settings: Settings) -> dict[str,
     plan = _plan(body, problem)
     payload: dict[str, Any] = {"problem": problem_to_record(problem), "assignment": plan.assignment}
     if plan.warnings:
-        told = [(f"/flight_files{each.pointer}", each.detail) for each in plan.warnings]
-        payload["warnings"] = to_record(tuple(warnings_of(PASSED_OVER, told)))
+        payload["warnings"] = to_record(plan.warnings)
     for name, amounts in _amounts(body, problem, plan.assignment).items():
         payload[name] = amounts
     if body.bound:

@@ -44,7 +44,7 @@ CODES = (
 )
 """Every code that a warning can have."""
 
-_MOST = 10
+MOST = 10
 """Warnings of one code; the last one says how many more there are."""
 
 _FAR = 10.0
@@ -215,9 +215,9 @@ def _on_sphere(points: Floats) -> Floats:
 
 def warnings_of(code: str, found: Sequence[tuple[str, str]]) -> Iterator[ProblemWarning]:
     """Make warnings of one code out of pointers and details: ten at most, and the last counts all others."""
-    for number, (pointer, detail) in enumerate(found[:_MOST], 1):
-        more = len(found) - _MOST
-        tail = f"; so it is at {more} more places" if number == _MOST and more > 0 else ""
+    for number, (pointer, detail) in enumerate(found[:MOST], 1):
+        more = len(found) - MOST
+        tail = f"; so it is at {more} more places" if number == MOST and more > 0 else ""
         yield ProblemWarning(pointer, code, detail + tail)
 
 

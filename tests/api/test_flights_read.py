@@ -135,7 +135,7 @@ def test_waypoints_are_matched_within_the_tolerance_to_what_is_nearest():
     rows = [[2, N, N, N], [3, N, N, N]]
     name, text = first_of(rows)
     assert plan_of_files(PROBLEM, [ReadFile(name, None, moved(text, 0.0004))], 50.0).assignment == rows
-    assert plan_of_files(PROBLEM, [ReadFile(name, None, moved(text, 0.01))], 1200.0).assignment == rows
+    assert plan_of_files(PROBLEM, [ReadFile(name, None, moved(text, 0.008))], 900.0).assignment == rows
     far = refused([ReadFile(name, None, moved(text, 0.0005))])
     assert list(far) == ["/flight_files/0/content"]
     assert "item 4 (NAV_PAYLOAD_PLACE)" in far["/flight_files/0/content"]

@@ -6,6 +6,8 @@ passed over on the way is no part of a plan, whose ways follow from its stops.
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
@@ -14,8 +16,9 @@ from app.api.plan_formats.flights import Point
 from app.api.plan_formats.qgroundcontrol import place_of
 from app.api.plan_formats.waypoints import FlightFile, UnreadableFlight, Waypoint, read_flight_file
 from app.domain.errors import InvalidProblem, Violation
-from app.domain.geometry import distance
+from app.domain.geometry import EARTH_RADIUS_KM, distance
 from app.domain.problem import Problem
+from app.domain.warnings import MOST, ProblemWarning, warnings_of
 
 PASSED_OVER = "waypoint_passed_over"
 """Code of the warning of a waypoint that is at no place of the problem."""
@@ -59,11 +62,11 @@ class ReadPlan:
     assignment
         One joint action a step.
     warnings
-        Of waypoints that are at no place of the problem; pointers are into the list of files.
+        Of waypoints that are at no place of the problem.
     """
 
     assignment: list[list[int]]
-    warnings: tuple[Violation, ...]
+    warnings: tuple[ProblemWarning, ...]
 
 
 @dataclass(slots=True)
@@ -95,19 +98,20 @@ def plan_of_files(problem: Problem, files: Sequence[ReadFile], within_m: float) 
     """
     if problem.crs != "wgs84":
         raise InvalidProblem.of([Violation("/crs", f"{problem.crs!r}; flight files need 'wgs84'")])
+    known = _Known(problem, within_m)
     violations: list[Violation] = []
-    warnings: list[Violation] = []
+    passed_over: list[tuple[int, Waypoint]] = []
     by_uav: dict[int, list[tuple[int, int, list[_Flight]]]] = {}
     for n, file in enumerate(files):
         try:
             uav, number = _whose(problem, file)
-            read = _Reading(problem, uav, within_m, read_flight_file(file.content))
+            read = _Reading(known, read_flight_file(file.content))
             flights = read.flights()
         except (UnreadableFlight, _Refused) as error:
             field_name = "content" if isinstance(error, UnreadableFlight) else error.args[1]
             violations.append(Violation(f"/{n}/{field_name}", f"{file.name}: {error.args[0]}"))
             continue
-        warnings += [Violation(f"/{n}/content", f"{file.name}: {each}") for each in read.passed_over]
+        passed_over += [(n, item) for item in read.passed_over]
         by_uav.setdefault(uav, []).append((number, n, flights))
     actions: dict[int, list[int]] = {}
     for uav, listed in by_uav.items():
@@ -122,6 +126,12 @@ def plan_of_files(problem: Problem, files: Sequence[ReadFile], within_m: float) 
     if violations:
         inside = [Violation(f"/flight_files{each.pointer}", each.detail) for each in violations]
         raise InvalidProblem.of(inside)
+    told = [
+        (f"/flight_files/{n}/content", f"{files[n].name}: {known.where(item, item.place)}")
+        for n, item in passed_over[:MOST]
+    ]
+    # Of those that are only counted nobody reads where they are.
+    warnings = warnings_of(PASSED_OVER, [*told, *([("", "")] * (len(passed_over) - len(told)))])
     return ReadPlan(_rows(problem, actions), tuple(warnings))
 
 
@@ -160,21 +170,79 @@ def _whose(problem: Problem, file: ReadFile) -> tuple[int, int]:
     return place, number
 
 
-class _Reading:
-    """A flight file that is read."""
+class _Places:
+    """Places that are looked for by what is near them, so that a long file is read soon.
 
-    def __init__(self, problem: Problem, uav: int, within_m: float, file: FlightFile) -> None:
-        self._problem, self._within_m, self._file = problem, within_m, file
-        starts = (
-            (problem.uavs[uav].x_s, problem.uavs[uav].y_s),
-            (problem.uavs[uav].x_c, problem.uavs[uav].y_c),
-        )
-        self._areas = [(target.x, target.y) for target in problem.targets]
-        self._bases = [(base.x, base.y) for base in problem.bases]
+    Parameters
+    ----------
+    places
+        Longitudes and latitudes.
+    within_m
+        How near is near.
+    """
+
+    def __init__(self, places: Sequence[Point], within_m: float) -> None:
+        self._places, self._within_m = places, within_m
+        self._order = sorted(range(len(places)), key=lambda each: places[each][1])
+        self._latitudes = [places[each][1] for each in self._order]
+        # A degree of latitude is as long everywhere.
+        self._degrees = math.degrees(within_m / (_M_PER_KM * EARTH_RADIUS_KM)) * (1.0 + 1e-9)
+
+    def near(self, place: Point) -> list[tuple[float, int]]:
+        """Return what is near a place, the nearest first: how far it is, in m, and its index."""
+        begin = bisect_left(self._latitudes, place[1] - self._degrees)
+        end = bisect_right(self._latitudes, place[1] + self._degrees)
+        away = ((_apart_m(place, self._places[each]), each) for each in self._order[begin:end])
+        return sorted(each for each in away if each[0] <= self._within_m)
+
+
+class _Known:
+    """The places of a problem.
+
+    Attributes
+    ----------
+    problem, within_m
+        As of :func:`plan_of_files`.
+    areas, bases
+        Where something can be done.
+    others
+        What may be flown over besides: where UAVs start and are, and corners of zones.
+    """
+
+    def __init__(self, problem: Problem, within_m: float) -> None:
+        self.problem, self.within_m = problem, within_m
+        self.areas = _Places([(target.x, target.y) for target in problem.targets], within_m)
+        self.bases = _Places([(base.x, base.y) for base in problem.bases], within_m)
+        starts = [place for uav in problem.uavs for place in ((uav.x_s, uav.y_s), (uav.x_c, uav.y_c))]
         corners = [corner for zone in problem.no_fly_zones for corner in zone.polygon]
-        home = () if file.home is None else (file.home,)
-        self._known = [*starts, *home, *self._bases, *corners]
-        self.passed_over: list[str] = []
+        self.others = _Places([*starts, *corners], within_m)
+
+    def where(self, item: Waypoint, place: Point) -> str:
+        """Say where an item of a file is, and how far that is from what is nearest."""
+        away = [(_apart_m(place, (each.x, each.y)), each.id) for each in self.problem.targets]
+        away += [(_apart_m(place, (each.x, each.y)), each.id) for each in self.problem.bases]
+        nearest, whose = min(away)
+        return (
+            f"{_called(item)} at latitude {place[1]:.6f}, longitude {place[0]:.6f} is at no area or "
+            f"base: the nearest, {whose!r}, is {nearest:.0f} m away, more than {self.within_m:g} m"
+        )
+
+
+def _apart_m(one: Point, other: Point) -> float:
+    return _M_PER_KM * distance("wgs84", *one, *other)
+
+
+def _called(item: Waypoint) -> str:
+    names = _FLOWN_TO | _LANDS | _PLACES | _RELEASES | _REPEATS
+    return f"item {item.number} ({names[item.command]})"
+
+
+class _Reading:
+    """A flight file that is read; `passed_over` is what it flies over that is no place of the problem."""
+
+    def __init__(self, known: _Known, file: FlightFile) -> None:
+        self._known, self._file = known, file
+        self.passed_over: list[Waypoint] = []
 
     def flights(self) -> list[_Flight]:
         """Return what the file says: one flight, or several with reloads between them.
@@ -195,7 +263,7 @@ class _Reading:
                 at, unknown = None, None
                 continue
             if command in _REPEATS:
-                raise _Refused(f"{self._called(item)}: missions that repeat items are not read", "content")
+                raise _Refused(f"{_called(item)}: missions that repeat items are not read", "content")
             if command == _RETURNS:
                 flights[-1].landed = self._base(self._file.home)
             elif base is not None:
@@ -210,65 +278,48 @@ class _Reading:
                 if area is None:
                     unknown = self._nowhere(item)
             elif command in _RELEASES and unknown is not None:
-                raise _Refused(self._where(item, unknown.place), "content")
+                raise _Refused(self._known.where(item, unknown.place), "content")
         return flights
 
     def _lands_next(self, item: Waypoint, following: Waypoint | None) -> bool:
         """Say whether a UAV flies over a base to land there."""
         if following is None or self._landing(following) is None:
             return False
-        return self._apart_m(item.place, following.place) <= _SAME_PLACE_M
+        return _apart_m(item.place, following.place) <= _SAME_PLACE_M
 
     def _nowhere(self, item: Waypoint) -> Waypoint | None:
         """Take note of a place that is no area's; return it where it is none of the problem's at all."""
-        known = any(self._apart_m(item.place, each) <= self._within_m for each in self._known)
+        is_home = (
+            self._file.home is not None and _apart_m(item.place, self._file.home) <= self._known.within_m
+        )
+        known = is_home or self._known.bases.near(item.place) or self._known.others.near(item.place)
         if item.command in _PLACES or (item.command in _LANDS and not known):
-            raise _Refused(self._where(item, item.place), "content")
+            raise _Refused(self._known.where(item, item.place), "content")
         if known:
             return None
-        self.passed_over.append(self._where(item, item.place))
+        self.passed_over.append(item)
         return item
 
     def _area(self, item: Waypoint) -> int | None:
-        near = sorted((self._apart_m(item.place, place), j) for j, place in enumerate(self._areas))
-        if not near or near[0][0] > self._within_m:
+        near = self._known.areas.near(item.place)
+        if not near:
             return None
-        (first, area), *others = near
-        if others and others[0][0] <= self._within_m and others[0][0] - first < _SAME_PLACE_M:
-            one, other = (self._problem.targets[j].id for j in (area, others[0][1]))
+        if len(near) > 1 and near[1][0] - near[0][0] < _SAME_PLACE_M:
+            one, other = (self._known.problem.targets[j].id for _, j in near[:2])
             raise _Refused(
-                f"{self._called(item)} is as near to {one!r} as to {other!r}: the file does not say which",
+                f"{_called(item)} is as near to {one!r} as to {other!r}: the file does not say which",
                 "content",
             )
-        return area
+        return near[0][1]
 
     def _base(self, place: Point | None) -> int | None:
-        if place is None:
-            return None
-        near = sorted((self._apart_m(place, base), d) for d, base in enumerate(self._bases))
-        return near[0][1] if near and near[0][0] <= self._within_m else None
+        near = [] if place is None else self._known.bases.near(place)
+        return near[0][1] if near else None
 
     def _landing(self, item: Waypoint) -> int | None:
         """Return the base at which an item lands; None if it lands at none, or at an area that is nearer."""
-        base = self._base(item.place) if item.command in _LANDS else None
-        if base is None:
+        bases = self._known.bases.near(item.place) if item.command in _LANDS else []
+        areas = self._known.areas.near(item.place) if bases else []
+        if not bases or (areas and areas[0][0] < bases[0][0]):
             return None
-        to_area = min(self._apart_m(item.place, each) for each in self._areas)
-        return None if to_area < self._apart_m(item.place, self._bases[base]) else base
-
-    def _where(self, item: Waypoint, place: Point) -> str:
-        away = [(self._apart_m(place, (each.x, each.y)), each.id) for each in self._problem.targets]
-        away += [(self._apart_m(place, (each.x, each.y)), each.id) for each in self._problem.bases]
-        nearest, whose = min(away)
-        return (
-            f"{self._called(item)} at latitude {place[1]:.6f}, longitude {place[0]:.6f} is at no area or "
-            f"base: the nearest, {whose!r}, is {nearest:.0f} m away, more than {self._within_m:g} m"
-        )
-
-    def _called(self, item: Waypoint) -> str:
-        names = _FLOWN_TO | _LANDS | _PLACES | _RELEASES | _REPEATS
-        return f"item {item.number} ({names[item.command]})"
-
-    @staticmethod
-    def _apart_m(one: Point, other: Point) -> float:
-        return _M_PER_KM * distance("wgs84", *one, *other)
+        return bases[0][1]
