@@ -54,8 +54,11 @@ def test_a_plan_is_found_followed_evaluated_and_taken_along(client, problem):
     client.wait(flown["id"])
     archive = client.export(flown["id"], "qgc-plan", delivery="gripper", gripper=2)
     with zipfile.ZipFile(BytesIO(archive.content)) as files:
-        items = json.loads(files.read(files.namelist()[0]))["mission"]["items"]
+        texts = [{"name": name, "content": files.read(name).decode()} for name in files.namelist()]
+    items = json.loads(texts[0]["content"])["mission"]["items"]
     assert {each["params"][0] for each in items if each["command"] == 211} == {2.0}
+    read = client.evaluate(client.problem_of(flown["id"]), flight_files=texts)
+    assert read["assignment"] == client.answer(flown["id"])["assignment"]
 
 
 def test_every_page_of_a_list_is_read(client, problem):
