@@ -17,7 +17,7 @@ from app.api.allocation_models import (
 from app.api.problem_models import ProblemModel
 from app.api.wire_fields import Whole, WireModel
 
-MAX_FLIGHT_FILES = 10_000
+MAX_FLIGHT_FILES = 2_000
 MAX_MATCH_WITHIN_M = 1_000.0
 
 AmountsOfStops = list[list[list[Annotated[float, Field(allow_inf_nan=False)]] | None]]
