@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import tomllib
+import zipfile
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -299,6 +300,27 @@ def test_a_plan_is_evaluated_without_a_server(tmp_path):
     refused = CliRunner().invoke(application, ["evaluate", str(file)])
     assert refused.exit_code == 1
     assert "1 actions for" in refused.stderr
+
+
+def test_flight_files_are_evaluated_without_a_server(tmp_path):
+    place = {"x_s": 34, "y_s": -19, "speed": 60, "voyage": 300, "loadlist": [2]}
+    near = {"x": 34.1, "y": -19, "level": 1, "loadlist": [2]}
+    paid = {"distance_weight": 0.001}
+    request = {"crs": "wgs84", "uavs": [place, place], "targets": [near], "objective": paid}
+    file, flights = tmp_path / "request.json", tmp_path / "flights.zip"
+    file.write_text(json.dumps(request))
+    columns = [(0, 1, 0, 16, -19.0, 34.0), (1, 0, 3, 22, -19.0, 34.0), (2, 0, 3, 16, -19.0, 34.1)]
+    lines = ["\t".join(map(str, (*each[:4], 0, 0, 0, 0, *each[4:], 50, 1))) for each in columns]
+    with zipfile.ZipFile(flights, "w") as archive:
+        archive.writestr("002-uav-2.waypoints", "QGC WPL 110\n" + "\n".join(lines) + "\n")
+    told = CliRunner().invoke(application, ["evaluate", str(file), "--flights", str(flights)])
+    assert told.exit_code == 0, told.stderr
+    assert json.loads(told.stdout)["assignment"] == [[1, 0]]
+    named = tmp_path / "mine.waypoints"
+    named.write_text("QGC WPL 110\n")
+    refused = CliRunner().invoke(application, ["evaluate", str(file), "--flights", str(named)])
+    assert refused.exit_code == 1
+    assert "mine.waypoints: its name does not begin with the UAV's number" in refused.stderr
 
 
 @pytest.mark.parametrize("given", ["[1]", "7", "{", "null"])

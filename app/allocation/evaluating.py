@@ -31,7 +31,7 @@ def evaluate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     payload
         ``problem`` (a record), ``assignment``, ``delivered`` and ``loaded`` where planned amounts are given,
         ``bound_time_limit_s`` where a bound is asked for, and ``at``, a clock, where the problem that remains
-        then is.
+        then is. ``warnings``: of how the plan was read, which the answer has before its own.
     context
         Once it is cancelled, reasons are looked for no further.
 
@@ -54,7 +54,7 @@ def evaluate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     at = payload.get("at")
     result = {
         **fields,
-        "warnings": to_record(problem_warnings(problem)),
+        "warnings": [*payload.get("warnings", ()), *to_record(problem_warnings(problem))],
         **bounding.bound_answer(problem, fields["reward"], limit, Deadline(limit or 0.0)),
         "remaining": None if at is None else problem_to_record(remaining_at(problem, plan, at, amounts)),
     }

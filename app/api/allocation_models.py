@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.api.plan_formats.flown_routes import PASSED_OVER
 from app.api.problem_models import ProblemModel
 from app.api.wire_fields import Whole, WireModel
 from app.domain.allocation import UnmetCode
@@ -239,7 +240,9 @@ class WarningModel(AnswerModel):
     """Something in the request that is taken as it is, but was probably not meant."""
 
     pointer: str = Field(description="JSON pointer to it in the problem (RFC 6901)")
-    code: str = Field(description="What it is, for programs", json_schema_extra={"enum": list(WARNING_CODES)})
+    code: str = Field(
+        description="What it is, for programs", json_schema_extra={"enum": [*WARNING_CODES, PASSED_OVER]}
+    )
     detail: str = Field(description="What it is, for people, with its numbers")
 
 

@@ -15,19 +15,48 @@ from app.api.allocation_models import (
     WarningModel,
 )
 from app.api.problem_models import ProblemModel
-from app.api.wire_fields import Whole
+from app.api.wire_fields import Whole, WireModel
+
+MAX_FLIGHT_FILES = 2_000
+MAX_MATCH_WITHIN_M = 1_000.0
 
 AmountsOfStops = list[list[list[Annotated[float, Field(allow_inf_nan=False)]] | None]]
 """Amounts by step, UAV and material."""
 
 
-class EvaluationRequest(ProblemModel):
-    """A problem, and a plan of it."""
+class FlightFileModel(WireModel):
+    """A flight of a UAV, as a ground station has it."""
 
-    assignment: list[list[Whole]] = Field(
+    name: str = Field(
+        max_length=255,
+        description="Of the file. `003-uav-3-flight-2.plan` is the second flight of the third UAV, as the "
+        "service names files; of any other name say whose it is",
+    )
+    uav_id: str | None = Field(default=None, description="Whose flight it is; default: as the name says")
+    content: str = Field(description="Its text: QGroundControl's `.plan`, or `QGC WPL 110` waypoints")
+
+
+class EvaluationRequest(ProblemModel):
+    """A problem, and a plan of it: as `assignment`, or as `flight_files`."""
+
+    assignment: list[list[Whole]] | None = Field(
+        default=None,
         min_length=1,
         description="One joint action a step: for each UAV the index of its target, N for home, or N + 1 + d "
         "to reload at base d",
+    )
+    flight_files: list[FlightFileModel] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=MAX_FLIGHT_FILES,
+        description="In place of `assignment`: a file a flight. Waypoints near an area are visits to it; who "
+        "has no file stays where it is. The answer has the plan as `assignment`",
+    )
+    match_within: float = Field(
+        default=50.0,
+        gt=0,
+        le=MAX_MATCH_WITHIN_M,
+        description="m that a waypoint of `flight_files` may be away from the area or base that it is at",
     )
     delivered: AmountsOfStops | None = Field(
         default=None,

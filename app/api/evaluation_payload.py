@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.api.evaluation_models import AmountsOfStops, EvaluationRequest
+from app.api.plan_formats.flown_routes import ReadFile, ReadPlan, plan_of_files
 from app.api.problem_models import to_problem
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.problem import Problem
-from app.domain.records import problem_to_record
+from app.domain.records import problem_to_record, to_record
 from app.settings import Settings
 
 
@@ -19,19 +20,15 @@ def evaluation_payload(body: EvaluationRequest, settings: Settings) -> dict[str,
     Raises
     ------
     ProblemTooLarge, InvalidProblem
-        As :func:`app.api.problem_models.to_problem` does, or if the plan has rows of another length than the
-        swarm has UAVs, or amounts that do not fit it.
+        As :func:`app.api.problem_models.to_problem` does, or if there is not one plan, it has rows of another
+        length than the swarm has UAVs, amounts that do not fit it, or flight files that say no plan.
     """
     problem = to_problem(body, settings)
-    violations = [
-        Violation(f"/assignment/{s}", f"{len(row)} actions for {problem.n_uavs} UAVs")
-        for s, row in enumerate(body.assignment)
-        if len(row) != problem.n_uavs
-    ]
-    if violations:
-        raise InvalidProblem.of(violations)
-    payload: dict[str, Any] = {"problem": problem_to_record(problem), "assignment": body.assignment}
-    for name, amounts in _amounts(body, problem).items():
+    plan = _plan(body, problem)
+    payload: dict[str, Any] = {"problem": problem_to_record(problem), "assignment": plan.assignment}
+    if plan.warnings:
+        payload["warnings"] = to_record(plan.warnings)
+    for name, amounts in _amounts(body, problem, plan.assignment).items():
         payload[name] = amounts
     if body.bound:
         payload["bound_time_limit_s"] = body.bound_time_limit_s
@@ -40,7 +37,34 @@ def evaluation_payload(body: EvaluationRequest, settings: Settings) -> dict[str,
     return payload
 
 
-def _amounts(body: EvaluationRequest, problem: Problem) -> dict[str, list[list[list[float]]]]:
+def _plan(body: EvaluationRequest, problem: Problem) -> ReadPlan:
+    """Return the plan that is to be evaluated, and what is to be said of how it was read.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is none, two, or one that is not of this problem.
+    """
+    if (body.assignment is None) == (body.flight_files is None):
+        detail = "one of `assignment` and `flight_files` is needed, and only one"
+        raise InvalidProblem.of([Violation("/assignment", detail)])
+    if body.flight_files is not None:
+        files = [ReadFile(each.name, each.uav_id, each.content) for each in body.flight_files]
+        return plan_of_files(problem, files, body.match_within)
+    assert body.assignment is not None
+    violations = [
+        Violation(f"/assignment/{s}", f"{len(row)} actions for {problem.n_uavs} UAVs")
+        for s, row in enumerate(body.assignment)
+        if len(row) != problem.n_uavs
+    ]
+    if violations:
+        raise InvalidProblem.of(violations)
+    return ReadPlan(body.assignment, ())
+
+
+def _amounts(
+    body: EvaluationRequest, problem: Problem, assignment: list[list[int]]
+) -> dict[str, list[list[list[float]]]]:
     """Return the amounts that are given, as they are planned: all or none.
 
     Raises
@@ -65,7 +89,7 @@ def _amounts(body: EvaluationRequest, problem: Problem) -> dict[str, list[list[l
             each
             for name, amounts in given.items()
             if amounts is not None
-            for each in _misfits(name, amounts, body)
+            for each in _misfits(name, amounts, body, assignment)
         ]
     if violations:
         raise InvalidProblem.of(violations)
@@ -77,9 +101,11 @@ def _amounts(body: EvaluationRequest, problem: Problem) -> dict[str, list[list[l
     }
 
 
-def _misfits(name: str, amounts: AmountsOfStops, body: EvaluationRequest) -> Iterator[Violation]:
+def _misfits(
+    name: str, amounts: AmountsOfStops, body: EvaluationRequest, assignment: list[list[int]]
+) -> Iterator[Violation]:
     """Yield where amounts have another shape than the plan, or are below 0 where nothing can be."""
-    materials, steps = len(body.uavs[0].loadlist), len(body.assignment)
+    materials, steps = len(body.uavs[0].loadlist), len(assignment)
     if len(amounts) != steps:
         yield Violation(f"/{name}", f"{len(amounts)} steps, but `assignment` has {steps}")
     for s, row in enumerate(amounts):

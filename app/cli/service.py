@@ -19,6 +19,7 @@ from app.api.body_validation import BodyValidator
 from app.api.evaluation_models import Evaluation, EvaluationRequest
 from app.api.evaluation_payload import evaluation_payload
 from app.api.json_body import parse_json
+from app.api.plan_formats.archive import texts_of
 from app.api.server import Server
 from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
 from app.cli.progress import bar
@@ -131,6 +132,13 @@ def allocate(
 def evaluate(
     file: Annotated[Path, typer.Argument(help="A request of POST /evaluate as JSON; - for standard input.")],
     at: Annotated[float | None, typer.Option(help="Instead of the request's.")] = None,
+    flights: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="In place of a plan in the request: a .plan or waypoint file, or a ZIP archive of them, "
+            "named as those of a plan that is taken away. Any number of them."
+        ),
+    ] = None,
 ) -> None:
     """Answer as POST /evaluate does, without a server; the answer goes to standard output."""
     started = time.monotonic()
@@ -139,6 +147,12 @@ def evaluate(
         body = parse_json(sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes())
         if isinstance(body, dict) and at is not None:
             body["at"] = at
+        if isinstance(body, dict) and flights:
+            body["flight_files"] = [
+                {"name": name, "content": text}
+                for path in flights
+                for name, text in texts_of(path.name, path.read_bytes()).items()
+            ]
         request = BodyValidator(EvaluationRequest).validate(body, settings)
         assert isinstance(request, EvaluationRequest)
         # Loads compiled code, which a call for help or a mistake need not wait for.

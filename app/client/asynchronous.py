@@ -119,11 +119,22 @@ class AsyncClient:
     async def evaluate(
         self,
         problem: types.Problem,
-        assignment: list[list[int]],
+        assignment: list[list[int]] | None = None,
         **options: Unpack[types.EvaluationOptions],
     ) -> types.Evaluation:
-        """Say what a plan of one's own earns and does."""
-        body = {**problem, "assignment": assignment, **options}
+        """Say what a plan of one's own earns and does.
+
+        Parameters
+        ----------
+        problem
+            The problem.
+        assignment
+            One joint action a step; None where ``flight_files`` of the options say the plan.
+        options
+            What is asked of it.
+        """
+        plan = {} if assignment is None else {"assignment": assignment}
+        body = {**problem, **plan, **options}
         call = Call("POST", "/evaluate", body=body, repeatable=True, waits=True)
         return cast(types.Evaluation, (await self._connection.send(call)).json())
 
@@ -233,10 +244,30 @@ class AsyncClient:
     # Missions
 
     async def begin_mission(
-        self, problem: types.Problem, **options: Unpack[types.MissionOptions]
+        self,
+        problem: types.Problem,
+        *,
+        idempotency_key: str | None = None,
+        **options: Unpack[types.MissionOptions],
     ) -> types.Mission:
-        """Begin a mission: a problem, and how it is planned while things happen."""
-        call = Call("POST", "/missions", body={"problem": problem, **options})
+        """Begin a mission: a problem, and how it is planned while things happen.
+
+        Parameters
+        ----------
+        problem
+            The problem.
+        idempotency_key
+            Makes a retry safe: the same key and request give the mission that the first one began.
+        options
+            How it is planned.
+        """
+        call = Call(
+            "POST",
+            "/missions",
+            body={"problem": problem, **options},
+            headers={"Idempotency-Key": idempotency_key},
+            repeatable=idempotency_key is not None,
+        )
         return cast(types.Mission, (await self._connection.send(call)).json())
 
     async def missions(self) -> AsyncGenerator[types.Mission]:

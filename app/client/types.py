@@ -206,6 +206,10 @@ class AllocationRequest(TypedDict):
     third is kept for it."""
 
 
+AltitudeBy = Literal["uav", "leg"]
+"""What has an altitude of its own."""
+
+
 AltitudeReference = Literal["home", "terrain"]
 """What altitudes are measured from."""
 
@@ -553,7 +557,7 @@ class Evaluation(TypedDict):
 
 @final
 class EvaluationRequest(TypedDict):
-    """A problem, and a plan of it."""
+    """A problem, and a plan of it: as `assignment`, or as `flight_files`."""
 
     uavs: list[UAV]
     """The swarm."""
@@ -591,9 +595,16 @@ class EvaluationRequest(TypedDict):
     start_plan: NotRequired[list[list[int]] | None]
     """An `assignment` to begin from and to compare with; no answer that takes a start earns less."""
 
-    assignment: list[list[int]]
+    assignment: NotRequired[list[list[int]] | None]
     """One joint action a step: for each UAV the index of its target, N for home, or N + 1 + d to reload at
     base d."""
+
+    flight_files: NotRequired[list[FlightFile] | None]
+    """In place of `assignment`: a file a flight. Waypoints near an area are visits to it; who has no file
+    stays where it is. The answer has the plan as `assignment`."""
+
+    match_within: NotRequired[float]
+    """m that a waypoint of `flight_files` may be away from the area or base that it is at."""
 
     delivered: NotRequired[list[list[list[float] | None]] | None]
     """With planned unloading, what every visit unloads: by step, UAV and material, null for nothing;
@@ -674,6 +685,21 @@ class FieldError(TypedDict):
 
     parameter: NotRequired[str | None]
     """The query parameter or header, where the error is not in the body."""
+
+
+@final
+class FlightFile(TypedDict):
+    """A flight of a UAV, as a ground station has it."""
+
+    name: str
+    """Of the file. `003-uav-3-flight-2.plan` is the second flight of the third UAV, as the service names
+    files; of any other name say whose it is."""
+
+    uav_id: NotRequired[str | None]
+    """Whose flight it is; default: as the name says."""
+
+    content: str
+    """Its text: QGroundControl's `.plan`, or `QGC WPL 110` waypoints."""
 
 
 @final
@@ -2177,6 +2203,7 @@ class WarningModel(TypedDict):
         "range_implausible",
         "range_spent",
         "speed_implausible",
+        "waypoint_passed_over",
     ]
     """What it is, for programs."""
 
@@ -2326,6 +2353,13 @@ class AllocationOptions(TypedDict):
 class EvaluationOptions(TypedDict):
     """What is asked of a plan."""
 
+    flight_files: NotRequired[list[FlightFile] | None]
+    """In place of `assignment`: a file a flight. Waypoints near an area are visits to it; who has no file
+    stays where it is. The answer has the plan as `assignment`."""
+
+    match_within: NotRequired[float]
+    """m that a waypoint of `flight_files` may be away from the area or base that it is at."""
+
     delivered: NotRequired[list[list[list[float] | None]] | None]
     """With planned unloading, what every visit unloads: by step, UAV and material, null for nothing;
     default: the best amounts of the plan."""
@@ -2391,17 +2425,26 @@ class PlanChoices(TypedDict):
     """Id of the UAV whose flights these are; default: all."""
 
     altitude: NotRequired[float]
-    """Flights: m, of the first UAV that starts at a place."""
+    """Flights: m, the lowest one."""
 
     altitude_step: NotRequired[float]
-    """Flights: m that each further UAV of a place flies above the one before it."""
+    """Flights: m that each further UAV of a place, or leg near others, flies above the one before it."""
+
+    altitude_by: NotRequired[AltitudeBy]
+    """Flights: what has an altitude of its own. uav: each UAV, so that those of one place are apart. leg:
+    each leg of a UAV, so that it is apart from every leg of another UAV that it crosses or comes near."""
+
+    clearance: NotRequired[float]
+    """With altitude_by=leg: m that legs of one altitude are away from each other."""
 
     altitude_of: NotRequired[list[str] | None]
-    """Flights: altitude of a UAV in m, as `uav-7=90`; may be repeated."""
+    """Flights: altitude of a UAV in m, as `uav-7=90` or, measured from something else than the others,
+    `uav-7=90@terrain`; or of a leg, as `uav-7/2=90` for that to its second stop (reloads are stops, and
+    the last leg leads home); may be repeated."""
 
     altitude_reference: NotRequired[AltitudeReference | None]
     """Flights: what altitudes are measured from; default: home, but the terrain for flights of more than 5
-    km."""
+    km, and with altitude_by=leg for all if one is so long or they start at several places."""
 
     launch_interval: NotRequired[float]
     """Flights: seconds between two take-offs at one place; later ones wait."""

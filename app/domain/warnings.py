@@ -7,7 +7,7 @@ from (a point is ten times as far off as the rest is wide, and out of everybody'
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ CODES = (
 )
 """Every code that a warning can have."""
 
-_MOST = 10
+MOST = 10
 """Warnings of one code; the last one says how many more there are."""
 
 _FAR = 10.0
@@ -123,7 +123,7 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
         M UAVs, N targets; it takes some 20 ms where M is 1000 and N is 2000.
     """
     scene = _scene(problem)
-    times = [warning for code, places in odd_times(problem) for warning in _some(code, places)]
+    times = [warning for code, places in odd_times(problem) for warning in warnings_of(code, places)]
     found = [*_supplies(scene), *times, *_speeds_and_ranges(scene), *_levels(scene)]
     if problem.matrices is not None:
         # Positions are for display alone.
@@ -213,11 +213,11 @@ def _on_sphere(points: Floats) -> Floats:
     return np.stack([flat * np.cos(longitude), flat * np.sin(longitude), np.sin(latitude)], axis=1)
 
 
-def _some(code: str, found: list[tuple[str, str]]) -> Iterator[ProblemWarning]:
-    """Make warnings of one code out of pointers and details, ``_MOST`` at most."""
-    for number, (pointer, detail) in enumerate(found[:_MOST], 1):
-        more = len(found) - _MOST
-        tail = f"; so it is at {more} more places" if number == _MOST and more > 0 else ""
+def warnings_of(code: str, found: Sequence[tuple[str, str]]) -> Iterator[ProblemWarning]:
+    """Make warnings of one code out of pointers and details: ten at most, and the last counts all others."""
+    for number, (pointer, detail) in enumerate(found[:MOST], 1):
+        more = len(found) - MOST
+        tail = f"; so it is at {more} more places" if number == MOST and more > 0 else ""
         yield ProblemWarning(pointer, code, detail + tail)
 
 
@@ -271,9 +271,9 @@ def _speeds_and_ranges(scene: _Scene) -> Iterator[ProblemWarning]:
         if scene.left[i] < 0.0 and not uav.ret:
             says = f"{uav.id!r} has flown {uav.dis:g}, more than its range of {uav.voyage:g}"
             spent.append((f"/uavs/{i}/dis", says))
-    yield from _some("speed_implausible", odd)
-    yield from _some("range_implausible", long)
-    yield from _some("range_spent", spent)
+    yield from warnings_of("speed_implausible", odd)
+    yield from warnings_of("range_implausible", long)
+    yield from warnings_of("range_spent", spent)
 
 
 def _swapped_targets(scene: _Scene) -> Iterator[ProblemWarning]:
@@ -300,7 +300,7 @@ def _swapped_targets(scene: _Scene) -> Iterator[ProblemWarning]:
         )
         for q in np.flatnonzero(swapped)
     ]
-    yield from _some("coordinates_swapped", found)
+    yield from warnings_of("coordinates_swapped", found)
 
 
 def _far_points(scene: _Scene, places: Floats) -> Iterator[ProblemWarning]:
@@ -342,7 +342,7 @@ def _far_points(scene: _Scene, places: Floats) -> Iterator[ProblemWarning]:
                 says += f"; with latitude and longitude exchanged it would be {then:.6g}"
         found[code].append((pointer, says))
     for code, each in found.items():
-        yield from _some(code, each)
+        yield from warnings_of(code, each)
 
 
 def _place(scene: _Scene, at: int) -> tuple[str, str, bool]:

@@ -70,10 +70,9 @@ class InvalidCursor(JobError):
 class IdempotencyMismatch(JobError):
     """An idempotency key was used before with another body."""
 
-    def __init__(self, key: str, job_id: str) -> None:
-        super().__init__(f"idempotency key {key!r} was used with another body, for job {job_id!r}")
+    def __init__(self, key: str, begun: str) -> None:
+        super().__init__(f"idempotency key {key!r} was used with another body, for {begun}")
         self.key = key
-        self.job_id = job_id
 
 
 INTERNAL_ERROR = "internal-error"

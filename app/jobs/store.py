@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,8 @@ from sqlalchemy import Connection, RowMapping
 from app.jobs import queries
 from app.jobs.capacity import QueueLimit
 from app.jobs.clock import Clock
-from app.jobs.errors import IdempotencyMismatch, QueueFull, failure
+from app.jobs.errors import QueueFull, failure
+from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
 from app.jobs.queries import Claim, Database, JobQueries
 from app.jobs.stored_json import read_later
@@ -126,7 +127,6 @@ class JobStore(JobQueries):
         """
         with self.database.write() as connection:
             if idempotency is not None:
-                self.database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
                 known = self._known(connection, idempotency)
                 if known is not None:
                     return known, False
@@ -160,8 +160,7 @@ class JobStore(JobQueries):
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
-                key = sa.insert(idempotency_keys).values(**asdict(idempotency), job_id=row["id"])
-                connection.execute(key)
+                keep(connection, idempotency_keys, idempotency, row["id"])
         return queries.claim_of(row, ahead), True
 
     def _waits(self, connection: Connection, lanes: Iterable[Lane]) -> bool:
@@ -169,15 +168,10 @@ class JobStore(JobQueries):
         return connection.scalar(_one_in(tuple(lanes))) is not None
 
     def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
-        of_client = idempotency_keys.c.client == idempotency.client
-        found = connection.execute(
-            sa.select(idempotency_keys).where(of_client, idempotency_keys.c.key == idempotency.key)
-        ).first()
-        if found is None:
+        job_id = claim_key(self.database, connection, idempotency_keys, idempotency)
+        if job_id is None:
             return None
-        if found.body_hash != idempotency.body_hash:
-            raise IdempotencyMismatch(idempotency.key, found.job_id)
-        row = queries.find(connection, found.job_id, queries.select_jobs)
+        row = queries.find(connection, job_id, queries.select_jobs)
         return queries.claim_of(row, self._times(connection)[1])
 
     def claim(self, lanes: Sequence[Lane]) -> Claim | None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
+from app.jobs.idempotency import key_table
+
 metadata = sa.MetaData()
 
 DATABASE_NOW = sa.cast(sa.extract("epoch", sa.func.clock_timestamp()), sa.Double)
@@ -64,16 +66,7 @@ artifacts = sa.Table(
     sa.Column("data", sa.LargeBinary, nullable=False),
 )
 
-idempotency_keys = sa.Table(
-    "job_idempotency_keys",
-    metadata,
-    sa.Column("client", sa.String(255), primary_key=True),
-    sa.Column("key", sa.String(255), primary_key=True),
-    sa.Column("body_hash", sa.String(128), nullable=False),
-    sa.Column(
-        "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False, index=True
-    ),
-)
+idempotency_keys = key_table(metadata, "job_idempotency_keys", "job_id", "jobs.id")
 
 # Where several services share a database: when each gave its last sign of life, by the database's clock.
 owners = sa.Table(

@@ -99,9 +99,7 @@ def create_server(url: str, key: str | None, description: Mapping[str, Any]) -> 
         With `at` the answer has the problem that remains at that moment of the plan.
         """
         async with service(context) as client:
-            body = dict(request)
-            assignment = body.pop("assignment", [])
-            return {**await client.evaluate(cast(types.Problem, body), assignment)}
+            return {**await client.evaluate(cast(types.Problem, request))}
 
     async def explain(context: Context, job_id: str) -> str:
         """Say in words what the plan of a job does and earns, and why needs stay unmet."""

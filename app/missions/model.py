@@ -1,4 +1,4 @@
-"""What is kept of a mission, as plain values: the mission, its history, its proposals."""
+"""What is kept of a mission as plain values: the mission, its history, its proposals, what is to be kept."""
 
 from __future__ import annotations
 
@@ -191,3 +191,45 @@ class Proposal:
     of_number: int
     job_id: str
     content: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """An event as it is to be kept.
+
+    Attributes
+    ----------
+    id, digest
+        Of the client, and of all that must not differ where the id comes again; None for the service's own.
+    type, at, body
+        What happened, and when by the mission's clock.
+    """
+
+    id: str | None
+    digest: str | None
+    type: str
+    at: float
+    body: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What was worked out of an event.
+
+    Attributes
+    ----------
+    state, plan
+        Records of the state that it makes, and of the plan in force.
+    effect
+        What it did to that.
+    wants_plan
+        Whether another plan may be better now.
+    closes
+        A proposal that it closes, and how; None for none.
+    """
+
+    state: Mapping[str, Any]
+    plan: Mapping[str, Any]
+    effect: Mapping[str, Any]
+    wants_plan: bool
+    closes: tuple[int, ProposalStatus] | None = None

@@ -14,11 +14,13 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
 from app.jobs.errors import InvalidCursor
+from app.jobs.idempotency import known_by
+from app.jobs.model import Idempotency
 from app.jobs.queries import Database
 from app.jobs.stored_json import read
 from app.missions.errors import MissionNotFound
 from app.missions.model import Entry, Head, Mission, Planning, Proposal, ProposalStatus
-from app.missions.tables import events, missions, positions, proposals, states
+from app.missions.tables import events, idempotency_keys, missions, positions, proposals, states
 
 _LARGE = {"number", "problem", "matrices"}
 _has_open = sa.exists().where(
@@ -58,6 +60,18 @@ class MissionQueries:
         """
         with self.database.read() as connection:
             return mission_of(find(connection, mission_id))
+
+    def begun_with(self, idempotency: Idempotency) -> Mission | None:
+        """Return the mission that was begun with an idempotency key; None if none was.
+
+        Raises
+        ------
+        IdempotencyMismatch
+            If the key came with another body.
+        """
+        with self.database.read() as connection:
+            known = known_by(connection, idempotency_keys, idempotency)
+            return None if known is None else mission_of(find(connection, known))
 
     def problem(self, mission_id: str) -> dict[str, Any]:
         """Return the record of the problem that a mission began with."""

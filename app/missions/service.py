@@ -12,16 +12,18 @@ from weakref import WeakValueDictionary
 
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
+from app.jobs.model import Idempotency
 from app.jobs.service import JobService
 from app.missions import events
 from app.missions.effects import differences
 from app.missions.errors import EventRefused, EventReused, MissionBusy, ProposalClosed
 from app.missions.judge import Judge
-from app.missions.model import Entry, Head, Mission, Planning, Proposal, ProposalStatus
+from app.missions.model import Entry, Judged, Mission, Planning, Proposal, ProposalStatus, Sent
 from app.missions.planner import Planner
 from app.missions.position_check import PositionCheck
+from app.missions.sizes import require_sizes
 from app.missions.state import MissionState, without_plan
-from app.missions.store import Judged, MissionStore, Moved, Sent, newest_of
+from app.missions.store import MissionStore, Moved, newest_of
 from app.missions.streams import MissionStreams, Told
 
 # Another service may write to a mission between a look at it and what follows from it; so often in a row it
@@ -103,25 +105,49 @@ class MissionService:
         if self._begun:
             await asyncio.wait(self._begun)
 
-    async def begin(self, name: str | None, problem: Problem, planning: Planning) -> Mission:
+    async def begin(
+        self, name: str | None, problem: Problem, planning: Planning, idempotency: Idempotency | None = None
+    ) -> tuple[Mission, bool]:
         """Begin a mission, with the problem's ``start_plan`` in force; without one nobody flies yet.
+
+        Parameters
+        ----------
+        name
+            For people.
+        problem, planning
+            What it begins with, and how it is planned.
+        idempotency
+            The key that the request came with.
+
+        Returns
+        -------
+        tuple
+            The mission, and whether it is new: a key that was seen before with the same request gives the
+            mission that it began, as it stands.
 
         Raises
         ------
+        IdempotencyMismatch
+            If the key came with another request before.
         IllegalPlan
             If that plan breaks a rule.
         MissionBusy
             If the judge does not answer.
         """
+        if idempotency is not None:
+            known = await asyncio.to_thread(self.store.begun_with, idempotency)
+            if known is not None:
+                return known, False
         if problem.start_plan is None:
             problem = without_plan(problem)
         record = problem_to_record(problem)
         begun = await self._judge.ask("begin", {"problem": record})
         state, plan = begun["state"], begun["plan"]
-        create = asyncio.to_thread(self.store.create, name, record, planning, state, plan)
-        mission = await self._whole(create)
-        self._planner.follow(mission.id)
-        return mission
+        create = asyncio.to_thread(self.store.create, name, record, planning, state, plan, idempotency)
+        mission, new = await self._whole(create)
+        if new:
+            self._planner.follow(mission.id)
+        return mission, new
 
     async def tell(
         self,
@@ -226,7 +252,7 @@ class MissionService:
         seen = head.new_positions
         if at is None:
             at = max([head.mission.clock, *(each["time"] for each in seen.values())])
-        self._require_sizes(head, event)
+        require_sizes(head.state["problem"], event, self._largest)
         proposal = await self._proposal_of(head.mission.id, event)
         body = events.event_to_record(event)
         payload = {
@@ -258,24 +284,6 @@ class MissionService:
         await self._judged(mission_id, events.Clock(), at, None, None)
         await asyncio.to_thread(self.store.outdate, mission_id, proposal.number)
         self._planner.follow(mission_id)
-
-    def _require_sizes(self, head: Head, event: events.Event) -> None:
-        """Refuse what would make the problem larger than is taken."""
-        problem = head.state["problem"]
-        added: dict[str, int] = {}
-        if isinstance(event, events.UavsAdded):
-            added["uavs"] = len(problem["uavs"]) + len(event.uavs)
-        elif isinstance(event, events.AreasAdded):
-            added["targets"] = len(problem["targets"]) + len(event.targets)
-        elif isinstance(event, events.ZonesChanged):
-            added["no_fly_zones"] = len(event.no_fly_zones)
-            added["zone_corners"] = sum(len(zone.polygon) for zone in event.no_fly_zones)
-        for name, size in added.items():
-            if size > self._largest[name]:
-                pointer = "/no_fly_zones" if name == "zone_corners" else f"/{name}"
-                what = name.replace("_", " ")
-                detail = f"{size} {what} with those there are, at most {self._largest[name]} are taken"
-                raise EventRefused.at(pointer, detail)
 
     async def _proposal_of(self, mission_id: str, event: events.Event) -> Proposal | None:
         """Return the proposal that an event is about, which has to be open."""

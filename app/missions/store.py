@@ -10,19 +10,20 @@ import time
 import uuid
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
+from app.jobs.idempotency import claim_key, keep
+from app.jobs.model import Idempotency
 from app.jobs.stored_json import write
 from app.missions import events as kinds
 from app.missions.errors import EventReused
-from app.missions.model import Entry, Mission, Planning, ProposalStatus
+from app.missions.model import Entry, Judged, Mission, Planning, ProposalStatus, Sent
 from app.missions.queries import MissionQueries, entry_of, find, known_in, mission_of, select_missions
-from app.missions.tables import events, missions, positions, proposals, states
+from app.missions.tables import events, idempotency_keys, missions, positions, proposals, states
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_missions"
@@ -33,48 +34,6 @@ _GAIN = 1e-9
 
 class Moved(Exception):
     """Another event came first: what was worked out is of a state that is no more."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """An event as it is to be kept.
-
-    Attributes
-    ----------
-    id, digest
-        Of the client, and of all that must not differ where the id comes again; None for the service's own.
-    type, at, body
-        What happened, and when by the mission's clock.
-    """
-
-    id: str | None
-    digest: str | None
-    type: str
-    at: float
-    body: Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """What was worked out of an event.
-
-    Attributes
-    ----------
-    state, plan
-        Records of the state that it makes, and of the plan in force.
-    effect
-        What it did to that.
-    wants_plan
-        Whether another plan may be better now.
-    closes
-        A proposal that it closes, and how; None for none.
-    """
-
-    state: Mapping[str, Any]
-    plan: Mapping[str, Any]
-    effect: Mapping[str, Any]
-    wants_plan: bool
-    closes: tuple[int, ProposalStatus] | None = None
 
 
 class MissionStore(MissionQueries):
@@ -91,8 +50,9 @@ class MissionStore(MissionQueries):
         planning: Planning,
         state: Mapping[str, Any],
         plan: Mapping[str, Any],
-    ) -> Mission:
-        """Begin a mission.
+        idempotency: Idempotency | None = None,
+    ) -> tuple[Mission, bool]:
+        """Begin a mission, or find the one that was begun with the same idempotency key.
 
         Parameters
         ----------
@@ -104,6 +64,18 @@ class MissionStore(MissionQueries):
             How it is planned.
         state, plan
             Records of the first state, and of the plan in force.
+        idempotency
+            The key that the request came with.
+
+        Returns
+        -------
+        tuple
+            The mission, and whether it is new.
+
+        Raises
+        ------
+        IdempotencyMismatch
+            If the key came with another body before.
         """
         now, mission_id = time.time(), uuid.uuid4().hex
         row = {
@@ -121,11 +93,17 @@ class MissionStore(MissionQueries):
             "matrices": problem.get("matrices"),
         }
         with self.database.write() as connection:
+            if idempotency is not None:
+                known = claim_key(self.database, connection, idempotency_keys, idempotency)
+                if known is not None:
+                    return mission_of(find(connection, known)), False
             connection.execute(sa.insert(missions).values(row))
+            if idempotency is not None:
+                keep(connection, idempotency_keys, idempotency, mission_id)
             connection.execute(sa.insert(states).values(mission_id=mission_id, state=state, plan=plan))
             begun = Sent(None, None, kinds.BEGUN, state["clock"], {"type": kinds.BEGUN})
             self._insert(connection, mission_id, 1, begun, {}, state)
-            return mission_of(find(connection, mission_id))
+            return mission_of(find(connection, mission_id)), True
 
     def delete(self, mission_id: str) -> None:
         """Delete a mission with all that is kept of it.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 
 from app.domain.identifiers import MAX_ID_LENGTH
+from app.jobs.idempotency import key_table
 
 metadata = sa.MetaData()
 
@@ -38,6 +39,9 @@ missions = sa.Table(
     sa.Index("ix_missions_wanted", "wanted", "planned"),
     sqlite_autoincrement=True,
 )
+
+
+idempotency_keys = key_table(metadata, "mission_idempotency_keys", "mission_id", "missions.id")
 
 
 def _of_mission() -> sa.Column[str]:

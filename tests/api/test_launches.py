@@ -136,7 +136,7 @@ def test_who_meets_at_a_base_later_flies_at_another_altitude():
 def test_altitudes_of_their_own_and_what_they_are_measured_from():
     near = (Target("near", 34.01, -19.0, 1.0, (1.0,)),)
     short = swarm(near, ((0, 1),), uavs=2)
-    (only,) = planned_flights(short, PLAIN, Separation(altitude_of={"u0": 130.0}))
+    (only,) = planned_flights(short, PLAIN, Separation(altitude_of={"u0": (130.0, None)}))
     assert (only.choices.altitude_m, only.choices.altitude_reference) == (130.0, AltitudeReference.HOME)
     assert any("130 m is above 120 m" in warning for warning in only.warnings)
     far = swarm((Target("far", 34.5, -19.0, 1.0, (1.0,)),), ((0, 1),), uavs=2)

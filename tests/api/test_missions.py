@@ -25,9 +25,9 @@ WITHIN_S = 60
 class Mission:
     """A mission, and a client of it."""
 
-    def __init__(self, client, **body):
+    def __init__(self, client, headers=None, **body):
         self.client = client
-        answer = client.post("/missions", json={"problem": SMALL, **QUICK, **body})
+        answer = client.post("/missions", json={"problem": SMALL, **QUICK, **body}, headers=headers)
         assert answer.status_code == 201, answer.text
         self.id = answer.json()["id"]
         assert answer.headers["location"] == self.path
@@ -365,6 +365,26 @@ def test_missions_are_listed_and_deleted(begin, client):
     assert client.delete(first.path).status_code == 204
     assert client.delete(first.path).json()["type"] == "/docs/errors#mission-not-found"
     assert first.send("clock").status_code == 404
+
+
+def test_a_retry_with_the_same_key_is_the_same_mission(begin, client):
+    key = {"Idempotency-Key": "mission-retry-1"}
+    body = {"problem": PLANNED, **QUICK, "name": "once"}
+    mission = begin(headers=key, **body)
+    mission.tell("clock", at=0.5)
+    mission.settle()
+
+    again = client.post("/missions", json=dict(reversed(body.items())), headers=key)
+    other = client.post("/missions", json={**body, "seed": 1}, headers=key)
+
+    assert (again.status_code, again.headers["location"]) == (200, mission.path)
+    now = mission.get()
+    assert again.json() == {name: now[name] for name in again.json()}
+    assert again.json()["clock"] == 0.5
+    assert other.status_code == 422
+    assert other.json()["type"] == "/docs/errors#idempotency-key-reused"
+    assert mission.id in other.json()["detail"]
+    assert [each["name"] for each in client.get("/missions").json()["missions"]].count("once") == 1
 
 
 def test_a_plan_that_breaks_a_rule_begins_nothing(client):

@@ -8,6 +8,7 @@ import pytest
 from mission_files import WAYPOINT, check_as_qgroundcontrol, commands
 
 from app.api.openapi_examples import example_problem
+from app.api.plan_formats.archive import texts_of
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +141,40 @@ def test_flights_of_all_uavs_come_in_one_document(client, flown, problem, format
     unknown = take(client, answer, format, altitude_of="nobody=50")
     assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#uav-not-found")
     assert unknown.json()["errors"][0]["parameter"] == "altitude_of"
+
+
+@pytest.mark.parametrize(("format", "by"), [("qgc-plan", "leg"), ("qgc-wpl", "uav")])
+def test_flight_files_come_back_as_the_same_evaluation(client, flown, format, by):
+    body, answer = flown
+    packed = take(client, answer, format, altitude_by=by, delivery="servo")
+    files = [{"name": name, "content": text} for name, text in texts_of("plan.zip", packed.content).items()]
+    problem = {name: value for name, value in body.items() if name not in ("algorithm", "parameters")}
+    problem.pop("time_limit_s", None)
+    read = client.post("/evaluate", json={**problem, "flight_files": files}).raise_for_status().json()
+    own = client.post("/evaluate", json={**problem, "assignment": answer["assignment"]}).json()
+    assert read["assignment"] == own["assignment"] == answer["assignment"]
+    changing = {"job_id", "elapsed_s"}
+    assert {name: read[name] for name in read.keys() - changing} == {
+        name: own[name] for name in own.keys() - changing
+    }
+    far = [{**each, "content": each["content"].replace("-19.", "-18.")} for each in files]
+    refused = client.post("/evaluate", json={**problem, "flight_files": far})
+    assert (refused.status_code, refused.json()["type"]) == (422, "/docs/errors#invalid-problem")
+    assert refused.json()["errors"][0]["pointer"] == "/flight_files/0/content"
+    assert "is at no area or base" in refused.json()["errors"][0]["detail"]
+
+
+def test_a_leg_has_the_altitude_that_is_asked_for(client, flown):
+    _, answer = flown
+    flying = next(route["uav_id"] for route in answer["routes"] if route["stops"])
+    own = [f"{flying}/1=77.5@home", f"{flying}=90"]
+    high = {"altitude_by": "leg", "clearance": 250, "altitude_of": own}
+    text = take(client, answer, "briefing", uav=flying, **high).text
+    assert "77.5 m above its start, 90 m above the ground below" in text
+    assert ", flown to at 77.5 m above its start" in text
+    unknown = take(client, answer, "briefing", altitude_of=f"{flying}/0=50")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "/docs/errors#uav-not-found")
+    beyond = take(client, answer, "briefing", altitude_of=f"{flying}/99=50")
+    assert (beyond.status_code, beyond.json()["errors"][0]["parameter"]) == (409, "altitude_of")
+    wrong = take(client, answer, "briefing", altitude_by="stop")
+    assert (wrong.status_code, wrong.json()["errors"][0]["parameter"]) == (422, "altitude_by")

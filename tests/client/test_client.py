@@ -54,8 +54,11 @@ def test_a_plan_is_found_followed_evaluated_and_taken_along(client, problem):
     client.wait(flown["id"])
     archive = client.export(flown["id"], "qgc-plan", delivery="gripper", gripper=2)
     with zipfile.ZipFile(BytesIO(archive.content)) as files:
-        items = json.loads(files.read(files.namelist()[0]))["mission"]["items"]
+        texts = [{"name": name, "content": files.read(name).decode()} for name in files.namelist()]
+    items = json.loads(texts[0]["content"])["mission"]["items"]
     assert {each["params"][0] for each in items if each["command"] == 211} == {2.0}
+    read = client.evaluate(client.problem_of(flown["id"]), flight_files=texts)
+    assert read["assignment"] == client.answer(flown["id"])["assignment"]
 
 
 def test_every_page_of_a_list_is_read(client, problem):
@@ -101,7 +104,9 @@ def test_a_job_that_fails_says_why(client, problem):
 
 
 def test_missions_are_begun_told_of_and_replayed(client, problem):
-    mission = client.begin_mission(_task(problem), algorithm="greedy", time_limit_s=5)["id"]
+    key, planning = uuid.uuid4().hex, {"algorithm": "greedy", "time_limit_s": 5}
+    mission = client.begin_mission(_task(problem), idempotency_key=key, **planning)["id"]
+    assert client.begin_mission(_task(problem), idempotency_key=key, **planning)["id"] == mission
     seen = []
     for event in client.follow_mission(mission):
         seen.append(event)

@@ -230,6 +230,15 @@ def test_corners_are_dragged_moved_added_and_removed_and_zones_renamed_moved_and
     expect(page.get_by_role("button", name="Corner 1 of Airport", exact=True)).to_be_visible()
 
     was = zones(page)[0]["polygon"]
+    at = page.get_by_role("button", name="All of Airport").bounding_box()
+    page.mouse.move(at["x"] + 7, at["y"] + 7)
+    page.mouse.down()
+    page.mouse.move(at["x"] + 7, at["y"] - 33, steps=4)
+    page.mouse.up()
+    now = zones(page)[0]["polygon"]
+    moved = [(x - was[at][0], y - was[at][1]) for at, (x, y) in enumerate(now)]
+    assert all(across == pytest.approx(0, abs=0.01) and along > 0 for across, along in moved)
+    was = now
     page.locator("#map").focus()
     page.keyboard.press("Alt+ArrowRight")
     now = zones(page)[0]["polygon"]

@@ -1,14 +1,19 @@
 """The tables of missions: an event and its state are one, numbers have no gaps, ids are kept once."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from app.jobs import stored_json
+from app.jobs.errors import IdempotencyMismatch
+from app.jobs.model import Idempotency
 from app.missions.errors import EventReused, MissionNotFound
-from app.missions.model import Planning, ProposalStatus
-from app.missions.store import VERSION_TABLE, Judged, MissionStore, Moved, Sent, newest_of
+from app.missions.model import Judged, Planning, ProposalStatus, Sent
+from app.missions.store import VERSION_TABLE, MissionStore, Moved, newest_of
 from app.missions.tables import events, metadata
 from policy_store.database import Database
 
@@ -27,7 +32,7 @@ def store(any_database_url):
 
 @pytest.fixture
 def mission(store):
-    return store.create("a town", PROBLEM, PLANNING, state(0.0), {"n": 0}).id
+    return store.create("a town", PROBLEM, PLANNING, state(0.0), {"n": 0})[0].id
 
 
 def state(clock):
@@ -80,8 +85,46 @@ def test_an_id_that_comes_again_is_the_same_event_or_refused(store, mission):
     assert store.commit(mission, 1, sent("a"), judged(1.0)) == (first, False)
     with pytest.raises(EventReused, match="number 2"):
         store.commit(mission, 2, sent("a", digest="other"), judged(1.0))
-    other = store.create(None, PROBLEM, PLANNING, state(0.0), {})
+    other, _ = store.create(None, PROBLEM, PLANNING, state(0.0), {})
     assert store.commit(other.id, 1, sent("a", digest="other"), judged(1.0))[1]
+
+
+def test_a_key_that_comes_again_is_the_same_mission_or_refused(store):
+    def create(key, body_hash, client="client"):
+        return store.create("once", PROBLEM, PLANNING, state(0.0), {}, Idempotency(client, key, body_hash))
+
+    first, new = create("k1", "hash-1")
+    assert new
+    assert store.begun_with(Idempotency("client", "k1", "hash-1")) == first
+    store.commit(first.id, 1, sent("a"), judged(1.0))
+    assert create("k1", "hash-1") == (store.get(first.id), False)
+    for look in (store.begun_with, lambda other: create(other.key, other.body_hash)):
+        with pytest.raises(
+            IdempotencyMismatch, match=f"'k1' was used with another body, for mission '{first.id}'"
+        ):
+            look(Idempotency("client", "k1", "hash-2"))
+    assert create("k1", "hash-2", client="another client")[1]
+    assert create("k2", "hash-1")[1]
+    assert len(store.page(10, None)[0]) == 3
+    # It goes with its mission, and begins another one then.
+    store.delete(first.id)
+    assert store.begun_with(Idempotency("client", "k1", "hash-2")) is None
+    assert create("k1", "hash-2")[1]
+
+
+def test_of_tries_at_the_same_time_one_begins_a_mission(store):
+    tries = 4
+    together, key = threading.Barrier(tries), Idempotency("client", "k", "hash")
+
+    def create(_):
+        together.wait()
+        return store.create("once", PROBLEM, PLANNING, state(0.0), {}, key)
+
+    with ThreadPoolExecutor(tries) as threads:
+        made = list(threads.map(create, range(tries)))
+
+    assert sorted(new for _, new in made) == [False, False, False, True]
+    assert len({mission.id for mission, _ in made}) == 1
 
 
 def test_positions_make_no_state_and_newer_ones_count(store, mission):
@@ -146,7 +189,7 @@ def test_a_mission_is_deleted_with_all_that_is_kept_of_it(store, mission):
 
 
 def test_missions_in_which_nothing_happens_any_more_are_deleted(store, mission):
-    busy = store.create("another", PROBLEM, PLANNING, state(0.0), {}).id
+    busy = store.create("another", PROBLEM, PLANNING, state(0.0), {})[0].id
     with store.database.write() as connection:
         connection.execute(sa.update(events).values(recorded_at=100.0))
     store.commit(busy, 1, sent("a"), judged(1.0))

@@ -174,7 +174,8 @@ def _library(recorder, problem):
 
 def _missions(recorder, problem):
     body = {"name": "Beira, 21 March", "problem": problem, "algorithm": "greedy", "time_limit_s": 5}
-    mission = recorder.send("POST", "/missions", body)["id"]
+    once = {"Idempotency-Key": "beira-21-march"}
+    mission = recorder.send("POST", "/missions", body, headers=once)["id"]
     path = f"/missions/{mission}"
 
     def settled():
@@ -184,6 +185,7 @@ def _missions(recorder, problem):
         return recorder.send("POST", f"{path}/events", event, name=name)
 
     _until(settled)
+    recorder.send("POST", "/missions", body, name="the same request once more", headers=once)
     found = recorder.send("GET", f"{path}/proposals")["proposals"][0]["number"]
     accepted = tell("a plan is accepted", type="proposal_accepted", id="yes-1", proposal=found)
     tell("six minutes later", type="clock", id="tick-1", at=0.1)

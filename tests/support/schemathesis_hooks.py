@@ -93,7 +93,8 @@ def has_amounts_that_misfit(body):
         return True
     for name in given:
         rows = body[name]
-        if len(rows) != len(body["assignment"]) or any(len(row) != m for row in rows):
+        plan = body.get("assignment") or ()
+        if len(rows) != len(plan) or any(len(row) != m for row in rows):
             return True
         stops = [each for row in rows for each in row if each is not None]
         if any(len(each) != k or (name == "delivered" and min(each, default=0) < 0) for each in stops):
@@ -157,8 +158,11 @@ def breaks_rule_beyond_schemas(case, kind):
     if case.path == "/missions":
         problem, asked, default = _begun_with(body), body, "auto"
     if kind == "invalid-problem":
-        rows = body.get("assignment", ()) if case.path == "/evaluate" else ()
+        rows = (body.get("assignment") or ()) if case.path == "/evaluate" else ()
         uneven = any(len(row) != len(body["uavs"]) for row in rows)
+        # Texts that are drawn are no flight files; and there is one plan, not none and not two.
+        if case.path == "/evaluate" and (body.get("flight_files") is not None or not rows):
+            return True
         beyond = asked is not None and problem is not None and is_beyond_observation(problem, asked, default)
         misfit = case.path == "/evaluate" and has_amounts_that_misfit(body)
         return uneven or misfit or beyond or (problem is not None and breaks_rules(problem))

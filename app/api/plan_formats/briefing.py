@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from app.api.plan_formats.altitudes import altitude_text
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
-from app.api.plan_formats.mission import AltitudeReference
 from app.api.plan_formats.printed_text import called, clock, position_text
-
-_MEASURED_FROM = {AltitudeReference.HOME: "its start", AltitudeReference.TERRAIN: "the ground below"}
 
 
 def briefing(plan: FlownPlan, flights: Sequence[PlannedFlight]) -> str:
@@ -32,21 +30,27 @@ def briefing(plan: FlownPlan, flights: Sequence[PlannedFlight]) -> str:
     return "\n".join(lines)
 
 
-def _flight(plan: FlownPlan, number: int, planned: PlannedFlight) -> Iterator[str]:
+def _flight(plan: FlownPlan, place: int, planned: PlannedFlight) -> Iterator[str]:
     flight, choices = planned.flight, planned.choices
     which = f", flight {flight.number}" if plan.has_bases else ""
-    yield f"{number}. {called(flight.uav)}{which}"
+    yield f"{place}. {called(flight.uav)}{which}"
     takes_off = flight.take_off_time
     begins = "is in the air" if takes_off is None else f"takes off at {clock(takes_off)}"
     yield f"   {begins}, {position_text(plan, *flight.place)}"
-    yield f"   {choices.altitude_m:g} m above {_MEASURED_FROM[choices.altitude_reference]}"
-    for at, stop in enumerate(flight.stops):
+    yield f"   {altitude_text(choices.altitudes)}"
+    several = len(choices.altitudes) > 1
+
+    def at(leg: int) -> str:
+        return f", flown to at {altitude_text([choices.altitude(leg)])}" if several else ""
+
+    for number, stop in enumerate(flight.stops):
         yield (
-            f"   {clock(flight.arrives(at))} {called(stop.target)}, {position_text(plan, *stop.path[-1])}, "
-            f"{stop.range_left:.1f} km of range left"
+            f"   {clock(flight.arrives(number))} {called(stop.target)}, "
+            f"{position_text(plan, *stop.path[-1])}, {stop.range_left:.1f} km of range left{at(number)}"
         )
     landing = flight.landing
     where = "where it started" if landing.base is None else f"at base {called(landing.base)}"
     if landing.time is not None:
-        yield f"   {clock(landing.time)} lands {where}, {landing.range_left:.1f} km of range left"
+        left = f"{landing.range_left:.1f} km of range left{at(len(flight.stops))}"
+        yield f"   {clock(landing.time)} lands {where}, {left}"
     yield from (f"   ! {warning}" for warning in planned.warnings)

@@ -1,57 +1,25 @@
-"""How flights keep apart: an altitude a UAV, launches one after the other, and what a pilot is warned of.
+"""Flights as they are to be flown: their altitudes, launches one by one, and what a pilot is warned of.
 
-A plan has neither altitudes nor a crew: its UAVs may all take off at once and fly at any height. Here each
-gets an altitude, and flights from one place take off one after the other, with what follows for their times.
+A plan has neither altitudes nor a crew: its UAVs may all take off at once and fly at any height. Here flights
+get altitudes, and those from one place take off one after the other, with what follows for their times.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import count
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
-from app.api.plan_formats.errors import OutOfRange
+from app.api.plan_formats.altitudes import TERRAIN_BEYOND_KM, Separation, flight_altitudes, length
 from app.api.plan_formats.flights import Flight, FlownReload, Point
 from app.api.plan_formats.flown_plan import FlownPlan, FlownRoute
-from app.api.plan_formats.mission import (
-    MAX_ALTITUDE_M,
-    MIN_ALTITUDE_M,
-    AltitudeReference,
-    Delivery,
-    FlightChoices,
-)
-from app.api.problem_details import FieldError
+from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
 from app.domain.problem import TOLERANCE
 
-TERRAIN_BEYOND_KM = 5.0
-"""Length of a flight above which its altitudes are above the ground below, unless something else is asked."""
 USUAL_CEILING_M = 120.0
 """Above the ground: higher than that most countries let nobody fly without a permission."""
-MAX_STEP_M, MAX_INTERVAL_S = 500.0, 3600.0
+MAX_INTERVAL_S = 3600.0
 _SECONDS_AN_HOUR = 3600.0
-
-
-@dataclass(frozen=True, slots=True)
-class Separation:
-    """How flights keep apart.
-
-    Attributes
-    ----------
-    altitude_step_m
-        Between UAVs that start or land at one place, in their order in the problem.
-    launch_interval_s
-        Between two launches at one place.
-    altitude_of
-        Altitudes in m by the id of the UAV, where it is not to be what the step makes it.
-    reference
-        What altitudes are measured from; None: home, or the ground below where a flight is long.
-    """
-
-    altitude_step_m: float = 10.0
-    launch_interval_s: float = 60.0
-    altitude_of: Mapping[str, float] = field(default_factory=dict)
-    reference: AltitudeReference | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +31,8 @@ class PlannedFlight:
     flight
         With the times that it has after those that are launched before it.
     choices
-        With its altitude, and what that is measured from.
+        With the altitudes of its legs, and what they are measured from; those of its first leg are also
+        ``altitude_m`` and ``altitude_reference``.
     delay
         How much later than in the plan it takes off, in h.
     warnings
@@ -86,53 +55,23 @@ def planned_flights(
     plan
         The plan.
     choices
-        Of all flights; the altitude is that of the first UAV of each place.
+        Of all flights; the altitude is the lowest one.
     separation
         How they keep apart.
 
     Raises
     ------
     OutOfRange
-        If a UAV would fly at an altitude that flight files cannot hold.
+        As :func:`~app.api.plan_formats.altitudes.flight_altitudes` does.
     """
-    altitudes = _altitudes(plan.flying, choices.altitude_m, separation)
-    if errors := [*_beyond(plan.flying, altitudes)]:
-        raise OutOfRange(errors)
+    altitudes = flight_altitudes(plan.flying, choices.altitude_m, separation)
     planned = []
     for flight, delay in _launched(plan.flying, separation.launch_interval_s):
-        far = _length(flight) > TERRAIN_BEYOND_KM
-        by_length = AltitudeReference.TERRAIN if far else AltitudeReference.HOME
-        own = replace(
-            choices,
-            altitude_m=altitudes[flight.uav.id],
-            altitude_reference=separation.reference or by_length,
-        )
-        planned.append(PlannedFlight(flight, own, delay, tuple(_warnings(flight, own, delay, far=far))))
+        legs = altitudes[flight.uav.id, flight.number]
+        first = legs[0]
+        own = replace(choices, altitude_m=first.metres, altitude_reference=first.reference, legs=legs)
+        planned.append(PlannedFlight(flight, own, delay, tuple(_warnings(flight, own, delay))))
     return tuple(planned)
-
-
-def _altitudes(routes: Sequence[FlownRoute], lowest_m: float, separation: Separation) -> dict[str, float]:
-    """Give each UAV that flies the lowest altitude that nobody has who starts or lands there."""
-    there: dict[Point, set[int]] = {}
-    altitudes = {}
-    for route in routes:
-        places = {place for flight in route.flown for place in (flight.launch, flight.landing.place)}
-        taken = set().union(*(there.setdefault(place, set()) for place in places))
-        rank = next(each for each in count() if each not in taken)
-        for place in places:
-            there[place].add(rank)
-        stepped = lowest_m + rank * separation.altitude_step_m
-        altitudes[route.uav.id] = separation.altitude_of.get(route.uav.id, stepped)
-    return altitudes
-
-
-def _beyond(routes: Sequence[FlownRoute], altitudes: Mapping[str, float]) -> Iterator[FieldError]:
-    for route in routes:
-        altitude = altitudes[route.uav.id]
-        if not MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M:
-            limits = f"{MIN_ALTITUDE_M:g}..{MAX_ALTITUDE_M:g}"
-            detail = f"{route.uav.id!r} would fly at {altitude:g} m, which is not in {limits}"
-            yield FieldError(pointer=f"/routes/{route.number}", detail=detail)
 
 
 def _launched(routes: Sequence[FlownRoute], interval_s: float) -> list[tuple[Flight, float]]:
@@ -188,11 +127,12 @@ def _shift(planned: Flight, flight: Flight) -> float:
     return 0.0 if before is None or after is None else after - before
 
 
-def _length(flight: Flight) -> float:
-    return sum(stop.distance for stop in flight.stops) + flight.landing.distance
+def _ends_with_return(flight: Flight, choices: FlightChoices) -> bool:
+    goes_home = isinstance(flight.landing, FlownReload) or choices.end is Ending.RETURN
+    return goes_home and flight.returns_to_launch
 
 
-def _warnings(flight: Flight, choices: FlightChoices, delay: float, *, far: bool) -> Iterator[str]:
+def _warnings(flight: Flight, choices: FlightChoices, delay: float) -> Iterator[str]:
     uav, landing = flight.uav, flight.landing
     if not flight.takes_off:
         yield "it is on its way already: the mission has no take-off, and begins where the UAV is"
@@ -206,16 +146,25 @@ def _warnings(flight: Flight, choices: FlightChoices, delay: float, *, far: bool
     end = uav.available_until
     if end is not None and landing.time is not None and landing.time > end + TOLERANCE * max(1.0, end):
         yield f"it lands at {landing.time:g} h, and is available until {end:g} h"
-    terrain = choices.altitude_reference is AltitudeReference.TERRAIN
-    if choices.altitude_m > USUAL_CEILING_M:
-        yield f"{choices.altitude_m:g} m is above {USUAL_CEILING_M:g} m, which mostly needs a permission"
-    if terrain:
+    highest_m = max(each.metres for each in choices.altitudes)
+    if highest_m > USUAL_CEILING_M:
+        yield f"{highest_m:g} m is above {USUAL_CEILING_M:g} m, which mostly needs a permission"
+    measured_from = {each.reference for each in choices.altitudes}
+    if AltitudeReference.TERRAIN in measured_from:
         yield "its altitudes are above the ground below: the autopilot needs terrain data of the whole way"
-    elif far:
+    elif length(flight) > TERRAIN_BEYOND_KM:
         yield (
-            f"it flies {_length(flight):.0f} km with altitudes above where it starts: look at the ground "
+            f"it flies {length(flight):.0f} km with altitudes above where it starts: look at the ground "
             "along its way"
         )
+    if len(choices.altitudes) > 1:
+        yield "it changes its altitude over its stops"
+        if _ends_with_return(flight, choices):
+            home_m = choices.altitude(len(flight.stops)).metres
+            yield (
+                f"its way home is flown at {home_m:g} m only if the autopilot's return altitude (RTL) is not "
+                "above that"
+            )
     if choices.delivery is Delivery.PAYLOAD_PLACE and choices.max_descent_m == 0:
         yield "it goes down to find the ground at every stop, as far as that takes (max_descent sets a limit)"
     ways = (*(stop.path for stop in flight.stops), landing.path)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
+from app.api.plan_formats.altitudes import altitude_text
 from app.api.plan_formats.antimeridian import closed
 from app.api.plan_formats.flights import Flight, Point
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
-from app.api.plan_formats.mission import AltitudeReference
+from app.api.plan_formats.mission import Altitude
 from app.api.plan_formats.printed_text import amounts_text, called, clock
 
 KML_TYPE = "application/vnd.google-earth.kml+xml"
@@ -32,8 +33,9 @@ def kml(plan: FlownPlan, flights: Sequence[PlannedFlight]) -> str:
         line = ET.SubElement(place, "LineString")
         ET.SubElement(line, "tessellate").text = "1"
         ET.SubElement(line, "altitudeMode").text = "relativeToGround"
-        height = each.choices.altitude_m
-        ET.SubElement(line, "coordinates").text = _coordinates(_way(each.flight), height)
+        ET.SubElement(line, "coordinates").text = " ".join(
+            _coordinates(way, high.metres) for way, high in _ways(each)
+        )
     folder = _folder(document, "Areas")
     for target in plan.problem.targets:
         place = _placemark(folder, called(target), f"needs {amounts_text(target.loadlist)}")
@@ -108,9 +110,18 @@ def _name(plan: FlownPlan, flight: Flight) -> str:
 def _about(each: PlannedFlight) -> str:
     choices, takes_off = each.choices, each.flight.take_off_time
     begin = "in the air already" if takes_off is None else f"takes off at {clock(takes_off)} h"
-    terrain = choices.altitude_reference is AltitudeReference.TERRAIN
-    told = [f"{begin}, {choices.altitude_m:g} m above {'the ground below' if terrain else 'its start'}"]
-    return "; ".join([*told, *each.warnings])
+    return "; ".join([f"{begin}, {altitude_text(choices.altitudes)}", *each.warnings])
+
+
+def _ways(planned: PlannedFlight) -> list[tuple[list[Point], Altitude]]:
+    """Return what is flown over leg by leg; where a leg begins only if its altitude is another one."""
+    flight, choices = planned.flight, planned.choices
+    ways = [([flight.place], choices.altitude(0))]
+    for leg, path in enumerate((*(stop.path for stop in flight.stops), flight.landing.path)):
+        high = choices.altitude(leg)
+        begin = 0 if high != ways[-1][1] else 1
+        ways.append(([*path[begin:]], high))
+    return ways
 
 
 def _way(flight: Flight) -> list[Point]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 
 from app.api.plan_formats.errors import OutOfRange
@@ -81,13 +81,35 @@ class AltitudeReference(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Altitude:
+    """How high a leg is flown.
+
+    Attributes
+    ----------
+    metres
+        See there.
+    reference
+        What they are measured from.
+    """
+
+    metres: float
+    reference: AltitudeReference
+
+    @property
+    def frame(self) -> Frame:
+        """The frame of items at this altitude."""
+        home = self.reference is AltitudeReference.HOME
+        return Frame.RELATIVE_ALTITUDE if home else Frame.TERRAIN_ALTITUDE
+
+
+@dataclass(frozen=True, slots=True)
 class FlightChoices:
     """What a plan leaves open and a flight file has to say.
 
     Attributes
     ----------
     altitude_m
-        Of all flight.
+        Of all legs that have none of their own.
     altitude_reference
         What it is measured from.
     delivery, end
@@ -98,6 +120,8 @@ class FlightChoices:
         Which gripper opens, for ``gripper``; from 1.
     max_descent_m
         How far ``payload-place`` may go down to find the ground; 0: as far as it takes.
+    legs
+        Altitudes of the legs of a flight in turn, that to where it lands last; empty: all have the same.
     """
 
     altitude_m: float = 50.0
@@ -108,12 +132,16 @@ class FlightChoices:
     servo_pwm_us: int = 1900
     gripper: int = 1
     max_descent_m: float = 0.0
+    legs: tuple[Altitude, ...] = ()
 
     @property
-    def frame(self) -> Frame:
-        """The frame of every item that has a place."""
-        home = self.altitude_reference is AltitudeReference.HOME
-        return Frame.RELATIVE_ALTITUDE if home else Frame.TERRAIN_ALTITUDE
+    def altitudes(self) -> tuple[Altitude, ...]:
+        """The altitudes that there are, each once, in the order in which they are flown."""
+        return tuple(dict.fromkeys(self.legs or (Altitude(self.altitude_m, self.altitude_reference),)))
+
+    def altitude(self, leg: int) -> Altitude:
+        """Return the altitude of a leg, counted from 0."""
+        return self.legs[leg] if self.legs else Altitude(self.altitude_m, self.altitude_reference)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +208,9 @@ def _ending(flight: Flight, choices: FlightChoices) -> Ending:
 
 def _items(flight: Flight, choices: FlightChoices) -> Iterator[MissionItem]:
     end = _ending(flight, choices)
+    high = choices.altitude(0)
     if flight.takes_off:
-        yield _placed(Command.TAKEOFF, choices, *flight.launch, choices.altitude_m)
+        yield _placed(Command.TAKEOFF, high, *flight.launch)
     told = speed_m_s(flight)
     yield _speed(told)
     for number, stop in enumerate(flight.stops):
@@ -189,22 +218,26 @@ def _items(flight: Flight, choices: FlightChoices) -> Iterator[MissionItem]:
         if _differs(speed, told):
             told = speed
             yield _speed(told)
-        yield from _corners(stop.path, choices)
-        lands = number == len(flight.stops) - 1 and end is Ending.LAND
-        yield from _visit(stop, choices, _seconds(flight.waiting_in_air(number)), lands=lands)
+        yield from _leg(stop.path, choices, number)
+        last = number == len(flight.stops) - 1
+        following = None if last and end is Ending.LAND else choices.altitude(number + 1)
+        waiting_s = _seconds(flight.waiting_in_air(number))
+        yield from _visit(stop, choices, choices.altitude(number), waiting_s, following)
+    home = len(flight.stops)
+    high = choices.altitude(home)
     if end is Ending.RETURN and flight.returns_to_launch:
-        yield from _corners(flight.landing.path, choices)
+        yield from _leg(flight.landing.path, choices, home)
         yield MissionItem(Command.RETURN_TO_LAUNCH, Frame.MISSION, (0.0, 0.0, 0.0, 0.0))
     elif end is Ending.RETURN:
         speed = flight.landing.ground_speed / 3.6
         if _differs(speed, told):
             yield _speed(speed)
-        yield from _corners(flight.landing.path, choices)
-        yield _placed(Command.WAYPOINT, choices, *flight.landing.place, choices.altitude_m)
-        yield _placed(Command.LAND, choices, *flight.landing.place, 0.0)
+        yield from _leg(flight.landing.path, choices, home)
+        yield _placed(Command.WAYPOINT, high, *flight.landing.place)
+        yield _placed(Command.LAND, replace(high, metres=0.0), *flight.landing.place)
     elif not (flight.stops and choices.delivery is Delivery.LAND):
         x, y = (flight.stops[-1].target.x, flight.stops[-1].target.y) if flight.stops else flight.place
-        yield _placed(Command.LAND, choices, x, y, 0.0)
+        yield _placed(Command.LAND, replace(choices.altitude(max(0, home - 1)), metres=0.0), x, y)
 
 
 def _differs(speed: float, told: float) -> bool:
@@ -220,31 +253,37 @@ def _seconds(hours: float) -> float:
     return hours * 3600.0
 
 
-def _corners(path: Points, choices: FlightChoices) -> Iterator[MissionItem]:
-    """Fly over the points between both ends of a way."""
+def _leg(path: Points, choices: FlightChoices, leg: int) -> Iterator[MissionItem]:
+    """Change the altitude over where a leg begins, and fly over the points between both ends of its way."""
+    high = choices.altitude(leg)
+    took_off = choices.delivery is Delivery.LAND
+    if leg > 0 and not took_off and high != choices.altitude(leg - 1):
+        yield _placed(Command.WAYPOINT, high, *path[0])
     for x, y in path[1:-1]:
-        yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
+        yield _placed(Command.WAYPOINT, high, x, y)
 
 
 def _visit(
-    stop: FlownStop, choices: FlightChoices, waiting_s: float, *, lands: bool
+    stop: FlownStop, choices: FlightChoices, high: Altitude, waiting_s: float, following: Altitude | None
 ) -> Iterator[MissionItem]:
+    """Arrive at an altitude, deliver and stay; `following` is that of the next leg, None where it lands."""
     x, y, hold_s = stop.target.x, stop.target.y, _seconds(stop.target.service_time)
     stay = MissionItem(Command.DELAY, Frame.MISSION, (hold_s, -1.0, -1.0, -1.0))
-    yield _placed(Command.WAYPOINT, choices, x, y, choices.altitude_m)
+    ground = replace(high, metres=0.0)
+    yield _placed(Command.WAYPOINT, high, x, y)
     if waiting_s > 0:
-        yield _placed(Command.LOITER_TIME, choices, x, y, choices.altitude_m, waiting_s)
+        yield _placed(Command.LOITER_TIME, high, x, y, waiting_s)
     match choices.delivery:
         case Delivery.LAND:
-            yield _placed(Command.LAND, choices, x, y, 0.0)
+            yield _placed(Command.LAND, ground, x, y)
             if hold_s > 0:
                 yield stay
-            if not lands:
-                yield _placed(Command.TAKEOFF, choices, x, y, choices.altitude_m)
+            if following is not None:
+                yield _placed(Command.TAKEOFF, following, x, y)
             return
         case Delivery.PAYLOAD_PLACE:
             first = choices.max_descent_m
-            yield _placed(Command.PAYLOAD_PLACE, choices, x, y, 0.0, first, heading=0.0)
+            yield _placed(Command.PAYLOAD_PLACE, ground, x, y, first, heading=0.0)
         case Delivery.SERVO:
             params = (float(choices.servo_channel), float(choices.servo_pwm_us), 0.0, 0.0)
             yield MissionItem(Command.SET_SERVO, Frame.MISSION, params)
@@ -258,15 +297,9 @@ def _visit(
 
 
 def _placed(
-    command: Command,
-    choices: FlightChoices,
-    x: float,
-    y: float,
-    altitude_m: float,
-    first: float = 0.0,
-    heading: float = math.nan,
+    command: Command, high: Altitude, x: float, y: float, first: float = 0.0, heading: float = math.nan
 ) -> MissionItem:
-    return MissionItem(command, choices.frame, (first, 0.0, 0.0, heading), (x, y, altitude_m))
+    return MissionItem(command, high.frame, (first, 0.0, 0.0, heading), (x, y, high.metres))
 
 
 def _violations(flight: Flight, choices: FlightChoices) -> Iterator[FieldError]:
@@ -321,7 +354,7 @@ def _speed_violations(at: str, flight: Flight, speed: float) -> Iterator[FieldEr
 
 def _choice_violations(choices: FlightChoices) -> Iterator[FieldError]:
     for name, value, low, high in (
-        ("altitude", choices.altitude_m, MIN_ALTITUDE_M, MAX_ALTITUDE_M),
+        *(("altitude", each.metres, MIN_ALTITUDE_M, MAX_ALTITUDE_M) for each in choices.altitudes),
         ("servo_channel", choices.servo_channel, 1, MAX_SERVO_CHANNEL),
         ("servo_pwm", choices.servo_pwm_us, MIN_SERVO_PWM_US, MAX_SERVO_PWM_US),
         ("gripper", choices.gripper, 1, MAX_GRIPPER),

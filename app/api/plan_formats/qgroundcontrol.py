@@ -10,8 +10,8 @@ from typing import Any
 
 from app.api.plan_formats.flights import Flight, FlownReload
 from app.api.plan_formats.mission import (
-    AltitudeReference,
     FlightChoices,
+    Frame,
     MissionItem,
     mission,
     mission_with_home,
@@ -21,8 +21,10 @@ from app.domain.surroundings import NoFlyZone
 
 _ARDUPILOT = 3
 _MULTICOPTER = 2
-_ALTITUDE_MODE = {AltitudeReference.HOME: 1, AltitudeReference.TERRAIN: 4}
+_MIXED = 0
+_ALTITUDE_MODE = {Frame.RELATIVE_ALTITUDE: 1, Frame.TERRAIN_ALTITUDE: 4}
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+_NAME = re.compile(r"(?P<place>[0-9]{3,9})-.*?(-flight-(?P<flight>[0-9]{1,9}))?\.[A-Za-z]+")
 
 
 def plan_file(flight: Flight, choices: FlightChoices, warnings: Sequence[str] = ()) -> str:
@@ -44,7 +46,7 @@ def plan_file(flight: Flight, choices: FlightChoices, warnings: Sequence[str] = 
         As :func:`~app.api.plan_formats.mission.mission` does.
     """
     items = mission(flight, choices)
-    altitude_mode = _ALTITUDE_MODE[choices.altitude_reference]
+    modes = {_ALTITUDE_MODE[each.frame] for each in choices.altitudes}
     speed = speed_m_s(flight)
     longitude, latitude = flight.launch
     content: dict[str, Any] = {
@@ -57,11 +59,11 @@ def plan_file(flight: Flight, choices: FlightChoices, warnings: Sequence[str] = 
             "version": 2,
             "firmwareType": _ARDUPILOT,
             "vehicleType": _MULTICOPTER,
-            "globalPlanAltitudeMode": altitude_mode,
+            "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else _MIXED,
             "cruiseSpeed": speed,
             "hoverSpeed": speed,
             "plannedHomePosition": [latitude, longitude, 0],
-            "items": [_simple_item(number, item, altitude_mode) for number, item in enumerate(items, 1)],
+            "items": [_simple_item(number, item) for number, item in enumerate(items, 1)],
         },
     }
     notes = [*_notes(flight), *(f"Warning: {warning}" for warning in warnings)]
@@ -127,7 +129,16 @@ def file_name(flight: Flight, ending: str, *, numbered: bool) -> str:
     return f"{flight.route + 1:03d}-{identifier[:60]}{number}.{ending}"
 
 
-def _simple_item(number: int, item: MissionItem, altitude_mode: int) -> dict[str, Any]:
+def place_of(name: str) -> tuple[int, int] | None:
+    """Return what a file's name says: the UAV's place in the swarm, from 0, and the number of the flight.
+
+    None for a name that is not as :func:`file_name` makes them; without a number it is the first flight.
+    """
+    found = _NAME.fullmatch(name)
+    return None if found is None else (int(found["place"]) - 1, int(found["flight"] or 1))
+
+
+def _simple_item(number: int, item: MissionItem) -> dict[str, Any]:
     params = [None if math.isnan(value) else value for value in item.params]
     content: dict[str, Any] = {
         "type": "SimpleItem",
@@ -143,6 +154,6 @@ def _simple_item(number: int, item: MissionItem, altitude_mode: int) -> dict[str
         **content,
         "params": [*params, latitude, longitude, altitude],
         "Altitude": altitude,
-        "AltitudeMode": altitude_mode,
+        "AltitudeMode": _ALTITUDE_MODE[item.frame],
         "AMSLAltAboveTerrain": None,
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from app.api.evaluation_models import Evaluation, EvaluationRequest
@@ -49,7 +50,8 @@ async def evaluate(
     An illegal plan is refused with every action that breaks a rule; `breaches` has the figures. With `at` the
     answer has the problem that remains at that moment, ready for `POST /allocate`.
     """
-    payload = evaluation_payload(body, services.settings)
+    # Flight files may be long.
+    payload = await run_in_threadpool(evaluation_payload, body, services.settings)
     job, _ = await services.jobs.submit(EVALUATE, payload)
     ended = await services.jobs.wait_for_client(job.id, None, gone(request))
     if ended is None:

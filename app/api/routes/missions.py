@@ -14,6 +14,7 @@ from starlette.responses import Response
 
 from app.api.access.guard import key_is_valid
 from app.api.event_streams import LastEventId, event_stream, last_seen
+from app.api.job_answers import idempotency
 from app.api.json_body import JsonRoute
 from app.api.mission_models import (
     MAX_NUMBER,
@@ -33,7 +34,7 @@ from app.api.mission_models import (
 from app.api.mission_payload import event_of, mission_answer, mission_of, proposal_answer
 from app.api.openapi_examples import EVENT_EXAMPLES, MISSION_EXAMPLES
 from app.api.problem_details import responses
-from app.api.routes.parameters import LOCATION, Cursor, MissionId
+from app.api.routes.parameters import LOCATION, Cursor, IdempotencyKey, MissionId
 from app.api.services import Served
 from app.domain.fields import MAX_MAGNITUDE
 from app.jobs.stored_json import write
@@ -66,9 +67,15 @@ _BODY_PROBLEMS = ("malformed-json", "body-too-large", "unsupported-media-type", 
     response_model=MissionModel,
     response_description="The mission; its first plan is being looked for",
     responses={
+        200: {
+            "model": MissionModel,
+            "description": "The same, as it stands, of a mission that was begun with this key already",
+            "headers": LOCATION,
+        },
         201: {"headers": LOCATION},
         **responses(
             *_BODY_PROBLEMS,
+            "idempotency-key-reused",
             "invalid-problem",
             "problem-too-large",
             "unknown-algorithm",
@@ -79,16 +86,21 @@ _BODY_PROBLEMS = ("malformed-json", "body-too-large", "unsupported-media-type", 
     },
 )
 async def begin_mission(
-    body: Annotated[MissionRequest, Body(openapi_examples=MISSION_EXAMPLES)], services: Served
+    body: Annotated[MissionRequest, Body(openapi_examples=MISSION_EXAMPLES)],
+    services: Served,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Begin a mission: a problem, and how it is planned while things happen.
 
     The `start_plan` of the problem is in force at first; without one nobody flies yet. A plan is looked for
-    at once, and after each event that another plan may be better after.
+    at once, and after each event that another plan may be better after. A retry with the same
+    `Idempotency-Key` and request gets the mission that the first one began.
     """
     problem, planning = await run_in_threadpool(mission_of, body, services.settings)
-    mission = await services.missions.begin(body.name, problem, planning)
-    return _answer(mission_answer(mission), 201, {"Location": f"/missions/{mission.id}"})
+    promise = idempotency(idempotency_key, "mission", body)
+    mission, new = await services.missions.begin(body.name, problem, planning, promise)
+    headers = {"Location": f"/missions/{mission.id}"}
+    return _answer(mission_answer(mission), 201 if new else 200, headers)
 
 
 @router.get(

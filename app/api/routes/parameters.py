@@ -22,7 +22,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=255,
         pattern=r"^[\x20-\x7e]+$",
-        description="Makes a retry safe: the same key and request give the first one's job and answer",
+        description="Makes a retry safe: the same key and request give what the first one began",
     ),
 ]
 Prefer = Annotated[

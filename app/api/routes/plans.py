@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated
 
@@ -14,6 +15,15 @@ from starlette.responses import Response
 
 from app.api.job_models import result_of
 from app.api.plan_formats import mission
+from app.api.plan_formats.altitudes import (
+    MAX_CLEARANCE_M,
+    MAX_STEP_M,
+    TERRAIN_BEYOND_KM,
+    AltitudeBy,
+    LegOf,
+    OwnAltitude,
+    Separation,
+)
 from app.api.plan_formats.archive import zip_archive
 from app.api.plan_formats.briefing import briefing
 from app.api.plan_formats.csv_table import csv_table
@@ -21,14 +31,7 @@ from app.api.plan_formats.errors import NoPlan, NotGeographic, NothingToFly, Unk
 from app.api.plan_formats.flown_plan import FlownPlan, flown_plan
 from app.api.plan_formats.geojson import MEDIA_TYPE as GEOJSON
 from app.api.plan_formats.geojson import geojson
-from app.api.plan_formats.launches import (
-    MAX_INTERVAL_S,
-    MAX_STEP_M,
-    TERRAIN_BEYOND_KM,
-    PlannedFlight,
-    Separation,
-    planned_flights,
-)
+from app.api.plan_formats.launches import MAX_INTERVAL_S, PlannedFlight, planned_flights
 from app.api.plan_formats.load_sheet import load_sheet
 from app.api.plan_formats.map_files import GPX_TYPE, KML_TYPE, gpx, kml
 from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
@@ -110,6 +113,7 @@ _FORMATS: dict[PlanFormat, _Document | _FlightsDocument | _FlightFile] = {
     ),
 }
 _CHOICES, _APART = FlightChoices(), Separation()
+_OWN_ALTITUDE = re.compile(r"^(?P<whose>.+)=(?P<metres>\d+(\.\d+)?)(@(?P<reference>home|terrain))?$")
 _ZIP = "application/zip"
 _TEXT = {"schema": {"type": "string"}}
 _OBJECT = {"schema": {"type": "object"}}
@@ -174,7 +178,7 @@ async def get_plan(
             ge=mission.MIN_ALTITUDE_M,
             le=mission.MAX_ALTITUDE_M,
             allow_inf_nan=False,
-            description="Flights: m, of the first UAV that starts at a place",
+            description="Flights: m, the lowest one",
         ),
     ] = _CHOICES.altitude_m,
     altitude_step: Annotated[
@@ -183,18 +187,42 @@ async def get_plan(
             ge=0,
             le=MAX_STEP_M,
             allow_inf_nan=False,
-            description="Flights: m that each further UAV of a place flies above the one before it",
+            description="Flights: m that each further UAV of a place, or leg near others, flies above the "
+            "one before it",
         ),
     ] = _APART.altitude_step_m,
+    altitude_by: Annotated[
+        AltitudeBy,
+        Query(
+            description="Flights: what has an altitude of its own. uav: each UAV, so that those of one place "
+            "are apart. leg: each leg of a UAV, so that it is apart from every leg of another UAV that it "
+            "crosses or comes near"
+        ),
+    ] = _APART.altitude_by,
+    clearance: Annotated[
+        float,
+        Query(
+            ge=0,
+            le=MAX_CLEARANCE_M,
+            allow_inf_nan=False,
+            description="With altitude_by=leg: m that legs of one altitude are away from each other",
+        ),
+    ] = _APART.clearance_m,
     altitude_of: Annotated[
-        list[Annotated[str, Field(max_length=120, pattern=r"^.+=\d+(\.\d+)?$")]] | None,
-        Query(max_length=1000, description="Flights: altitude of a UAV in m, as `uav-7=90`; may be repeated"),
+        list[Annotated[str, Field(max_length=130, pattern=_OWN_ALTITUDE.pattern)]] | None,
+        Query(
+            max_length=1000,
+            description="Flights: altitude of a UAV in m, as `uav-7=90` or, measured from something else "
+            "than the others, `uav-7=90@terrain`; or of a leg, as `uav-7/2=90` for that to its second stop "
+            "(reloads are stops, and the last leg leads home); may be repeated",
+        ),
     ] = None,
     altitude_reference: Annotated[
         AltitudeReference | None,
         Query(
             description="Flights: what altitudes are measured from; default: home, but the terrain for "
-            f"flights of more than {TERRAIN_BEYOND_KM:g} km"
+            f"flights of more than {TERRAIN_BEYOND_KM:g} km, and with altitude_by=leg for all if one is so "
+            "long or they start at several places"
         ),
     ] = None,
     launch_interval: Annotated[
@@ -260,15 +288,24 @@ async def get_plan(
         gripper=gripper,
         max_descent_m=max_descent,
     )
-    told = (each.rpartition("=") for each in altitude_of or ())
-    own = {uav_id: float(metres) for uav_id, _, metres in told}
-    separation = Separation(altitude_step, launch_interval, own, altitude_reference)
+    separation = Separation(
+        altitude_step,
+        launch_interval,
+        reference=altitude_reference,
+        altitude_by=altitude_by,
+        clearance_m=clearance,
+    )
     job = await services.jobs.get(job_id)
-    return await run_in_threadpool(_file, job, format, uav, choices, separation)
+    return await run_in_threadpool(_file, job, format, uav, choices, separation, altitude_of or ())
 
 
 def _file(
-    job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices, separation: Separation
+    job: Job,
+    format: PlanFormat,
+    uav: str | None,
+    choices: FlightChoices,
+    separation: Separation,
+    altitude_of: Sequence[str],
 ) -> Response:
     answer = result_of(job)
     if answer is None or "routes" not in answer:
@@ -282,10 +319,7 @@ def _file(
         return _response(kind.write(plan), kind.media_type, f"plan-{job.id[:8]}{sheet}.{kind.ending}", how)
     if plan.problem.crs != "wgs84":
         raise NotGeographic(format.value, plan.problem.crs)
-    known = {each.id for each in plan.problem.uavs}
-    if unknown := [each for each in separation.altitude_of if each not in known]:
-        raise UnknownUAV(unknown[0], "altitude_of")
-    flights = _flights(plan, uav, choices, separation)
+    flights = _flights(plan, uav, choices, _with_own(separation, altitude_of, plan))
     if isinstance(kind, _FlightsDocument):
         whose = "" if uav is None else f"-{flights[0].flight.route + 1:03d}"
         name = f"plan-{job.id[:8]}{whose}.{kind.ending}"
@@ -298,6 +332,33 @@ def _file(
         return _response(text, kind.media_type, name)
     of_uav = "" if uav is None else f"-{flights[0].flight.route + 1:03d}"
     return _response(zip_archive(files), _ZIP, f"plan-{job.id[:8]}{of_uav}-{format}.zip")
+
+
+def _with_own(separation: Separation, altitude_of: Sequence[str], plan: FlownPlan) -> Separation:
+    """Add altitudes that UAVs and legs are to have.
+
+    Raises
+    ------
+    UnknownUAV
+        If the plan does not have one of the UAVs.
+    """
+    known = {each.id for each in plan.problem.uavs}
+    of_uavs: dict[str, OwnAltitude] = {}
+    of_legs: dict[LegOf, OwnAltitude] = {}
+    for each in altitude_of:
+        told = _OWN_ALTITUDE.fullmatch(each)
+        assert told is not None
+        whose, measured_from = told["whose"], told["reference"]
+        own = float(told["metres"]), None if measured_from is None else AltitudeReference(measured_from)
+        uav_id, _, leg = whose.rpartition("/")
+        # An id may look like a leg of another one.
+        if whose in known:
+            of_uavs[whose] = own
+        elif uav_id in known and leg.isascii() and leg.isdigit() and int(leg) > 0:
+            of_legs[LegOf(uav_id, int(leg))] = own
+        else:
+            raise UnknownUAV(whose, "altitude_of")
+    return replace(separation, altitude_of=of_uavs, altitude_of_leg=of_legs)
 
 
 def _flights(

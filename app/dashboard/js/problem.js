@@ -117,12 +117,11 @@ export function addZone(polygon) {
   select({ kind: ZONES, id: zone.id });
 }
 
-/** Take a corner out of a zone, as long as enough are left. */
-export function withoutCorner(id, at) {
-  const { polygon } = get().problem[ZONES].find((zone) => zone.id === id);
+/** Take a corner out of a polygon. @param {(polygon: number[][]) => void} changed is given what is left, where that is enough for a zone */
+export function withoutCorner(polygon, at, changed) {
   const fewest = fewestCorners();
   if (polygon.length <= fewest) return notify(tn(fewest, "A zone has at least {count} corner: delete the whole zone instead", "A zone has at least {count} corners: delete the whole zone instead"), "error");
-  update(ZONES, id, { polygon: polygon.toSpliced(at, 1) });
+  changed(polygon.toSpliced(at, 1));
 }
 
 /** How many corners a zone has at least, as the service says. */

@@ -1,4 +1,4 @@
-/** The corners of the selected zone on the map: dragged, moved and removed by keys, and new ones between them. */
+/** The corners of the selected zone on the map: dragged, moved and removed by keys, and new ones between them; and all of it, by its middle. */
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { called } from "./plan.js";
@@ -9,6 +9,8 @@ import { crossings } from "./zones.js";
 
 /** With more corners there are no places for new ones between them. */
 const MANY = 120;
+/** What the handle of the whole zone has in place of the number of a corner. */
+const WHOLE = "all";
 
 /** Handles of one zone. */
 export class ZoneCorners {
@@ -36,7 +38,8 @@ export class ZoneCorners {
     if (!zone || !editable) return;
     zone.polygon.forEach((_, at) => this.#addCorner(zone, at));
     if (zone.polygon.length <= MANY) zone.polygon.forEach((_, at) => this.#addBetween(zone, at));
-    if (focused !== undefined) this.#focus(Math.min(Number(focused), zone.polygon.length - 1));
+    this.#addWhole(zone);
+    if (focused !== undefined) this.#focus(focused === WHOLE ? WHOLE : Math.min(Number(focused), zone.polygon.length - 1));
   }
 
   /** Move all of the zone. @param {number[]} by pixels */
@@ -57,8 +60,28 @@ export class ZoneCorners {
       if (event.key !== "Delete" && event.key !== "Backspace" && !by) return;
       event.preventDefault();
       event.stopPropagation();
-      if (by) this.options.changed(zone.id, zone.polygon.with(at, this.#moved(zone.polygon[at], by)));
-      else withoutCorner(zone.id, at);
+      const changed = (polygon) => this.options.changed(zone.id, polygon);
+      if (by) changed(zone.polygon.with(at, this.#moved(zone.polygon[at], by)));
+      else withoutCorner(zone.polygon, at, changed);
+    });
+  }
+
+  /** The middle of the zone's box, by which all of it is moved. */
+  #addWhole(zone) {
+    const { x, y } = L.bounds(zone.polygon.map((corner) => this.map.latLngToLayerPoint(this.#latLng(corner)))).getCenter();
+    const marker = this.#handle(this.map.layerPointToLatLng([x, y]), "corner whole", `All of ${called(zone)}`);
+    const from = this.map.latLngToLayerPoint(marker.getLatLng());
+    const by = () => { const away = this.map.latLngToLayerPoint(marker.getLatLng()).subtract(from); return [away.x, away.y]; };
+    marker.on("drag", () => this.#drawSides(zone.polygon.map((corner) => this.#moved(corner, by()))));
+    marker.on("dragend", () => this.move(by()));
+    const element = marker.getElement();
+    element.dataset.corner = WHOLE;
+    element.addEventListener("keydown", (event) => {
+      const nudged = this.options.nudge(event);
+      if (!nudged) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.move(nudged);
     });
   }
 

@@ -62,11 +62,10 @@ export function crossingNotes() {
   return notes;
 }
 
-/** The corners of a zone as fields, and what is wrong with its sides. */
-export function cornersOf(zone, { crs }) {
+/** The corners of a zone as fields, and what is wrong with its sides. @param {(polygon: number[][]) => void} [put] takes what it becomes; the problem on screen otherwise */
+export function cornersOf(zone, { crs }, put = (polygon) => update(ZONES, zone.id, { polygon })) {
   const fault = faultOf(zone, crs);
   const names = crs === "wgs84" ? [t("longitude"), t("latitude")] : ["x", "y"];
-  const put = (polygon) => update(ZONES, zone.id, { polygon });
   const number = (at, axis) => h("input", {
     type: "number", step: "any", value: String(zone.polygon[at][axis]), "aria-label": t("{axis} of corner {number}", { axis: names[axis], number: at + 1 }),
     onchange: ({ target }) => (target.value === "" ? notify(t("A corner needs two numbers"), "error") : put(zone.polygon.with(at, zone.polygon[at].with(axis, Number(target.value))))),
@@ -78,7 +77,7 @@ export function cornersOf(zone, { crs }) {
   const both = (title) => ({ title, "aria-label": title });
   const row = (_, at) => h("tr", { dataset: { corner: at } }, h("th", { scope: "row" }, String(at + 1)), h("td", {}, number(at, 0)), h("td", {}, number(at, 1)),
     h("td", {}, h("button", { type: "button", class: "quiet", ...both(t("New corner after corner {number}", { number: at + 1 })), onclick: () => put(between(at)) }, "+"),
-      h("button", { type: "button", class: "quiet", ...both(t("Remove corner {number}", { number: at + 1 })), onclick: () => withoutCorner(zone.id, at) }, "×")));
+      h("button", { type: "button", class: "quiet", ...both(t("Remove corner {number}", { number: at + 1 })), onclick: () => withoutCorner(zone.polygon, at, put) }, "×")));
   const table = h("table", { class: "corners" }, h("thead", {}, h("tr", {}, [t("Corner"), ...names, ""].map((title) => h(title ? "th" : "td", title ? { scope: "col" } : {}, title)))), h("tbody", {}, zone.polygon.slice(0, MANY).map(row)));
   return [
     h("p", { class: "error", role: "alert", hidden: !fault, id: "zone-fault" }, fault),

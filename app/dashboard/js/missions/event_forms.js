@@ -144,7 +144,8 @@ function stockChanged({ base_id: id }, { state: { problem } }) {
   return { title: t("Stock of {base}", { base: called(base) }), parts: [stock], read: () => ({ type: "stock_changed", base_id: id, stock: stock.read() }) };
 }
 
-function zonesChanged({ polygon, without }) {
+function zonesChanged({ polygon, without, shapes }) {
+  if (shapes) return { title: "Zones have another shape", says: "It counts once it is told.", parts: [shapes], read: () => ({ type: "zones_changed", no_fly_zones: shapes.read() }) };
   // All zones are told: those that there are when it is told, as others may have changed them since it was opened.
   const now = () => {
     const zones = get().openMission.head.state.problem[ZONES] ?? [];

@@ -10,6 +10,7 @@ import { drawingControls } from "../zone_form.js";
 import { FORMS } from "./event_forms.js";
 import { tell } from "./outbox.js";
 import { told } from "./wording.js";
+import { ZoneShapes } from "./zone_shapes.js";
 
 /** What can happen to an item of each list: the type of the event, and what its button says. */
 const OF = {
@@ -30,6 +31,7 @@ export class Happened {
     Object.assign(this, { map, momentOf, id: null });
     this.acts = h("div", { class: "row", id: "mission-acts" });
     this.place = h("div", { class: "block" });
+    this.shapes = new ZoneShapes(map, momentOf, { begun: () => this.open("zones_changed", { shapes: this.shapes }), gone: () => this.close() });
     const zone = drawingControls(map, { id: "mission-drawing", take: (polygon) => this.open("zones_changed", { polygon }) });
     const placing = (kind, type, title) => {
       const button = h("button", { type: "button", "aria-pressed": "false", dataset: { missionPlace: kind }, onclick: () => {
@@ -63,6 +65,7 @@ export class Happened {
     const possible = OF[selection.kind].filter(([type]) => type !== "reload_done" || moment.state.problem[BASES]?.length);
     this.acts.replaceChildren(h("strong", { title: item.id }, called(item)), ...possible.map(([type, title]) =>
       h("button", { type: "button", dataset: { type }, onclick: () => this.open(type, { [KEYS[selection.kind]]: item.id }) }, title)));
+    if (selection.kind === ZONES) this.acts.append(h("p", { class: "hint" }, "Drag its corners, or all of it by its middle, on the map; by keyboard with Alt and the arrows."));
   }
 
   /** Open the form of something that has happened. @param {string} type of the event @param {object} given what was clicked */
@@ -83,6 +86,12 @@ export class Happened {
       event.preventDefault();
       void this.#tell(form, send, others, { ...read(), ...(at.value === "" ? {} : { at: Number(at.value) }) });
     });
+    if (given.shapes) {
+      // The hand is on the map, and goes on there.
+      this.place.replaceChildren(form);
+      return;
+    }
+    this.close();
     this.place.replaceChildren(form);
     form.scrollIntoView({ block: "nearest" });
     (form.querySelector("select, input") ?? send).focus();
@@ -90,6 +99,7 @@ export class Happened {
 
   close() {
     this.place.replaceChildren();
+    if (this.shapes.changed.size) this.shapes.drop();
   }
 
   async #tell(form, send, others, event) {

@@ -6,6 +6,7 @@ import { Fields, showViolations } from "../fields.js";
 import { get, subscribe } from "../state.js";
 import { dateText, t } from "../texts.js";
 import { openMission } from "./feed.js";
+import { eventId } from "./outbox.js";
 
 /** Missions that others begin are seen so much later at most. */
 const LOOK_AGAIN_MS = 5000;
@@ -107,12 +108,21 @@ export class MissionList {
     this.form.replaceChildren(form);
   }
 
+  /** The same key until a mission has begun: its answer may have been lost on the way. */
+  #keyOf(body) {
+    const text = JSON.stringify(body);
+    if (this.tried?.text !== text) this.tried = { text, key: eventId() };
+    return this.tried.key;
+  }
+
   async #begin(form, start) {
     const { problem, answer } = get();
     start.disabled = true;
     try {
       const first = this.plan.checked && answer ? { start_plan: answer.assignment } : {};
-      const mission = await json("missions", { method: "POST", body: { ...this.fields.values(), problem: { ...problem, ...first } } });
+      const body = { ...this.fields.values(), problem: { ...problem, ...first } };
+      const mission = await json("missions", { method: "POST", body, headers: { "Idempotency-Key": this.#keyOf(body) } });
+      this.tried = null;
       showViolations(form, []);
       this.elsewhere.replaceChildren();
       openMission(mission.id);

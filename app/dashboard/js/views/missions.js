@@ -177,6 +177,7 @@ function drawMap(now, on) {
   mapped = { state: on.state, plan, positions };
   const problem = normalised(asSeen(on.state, positions ?? {}, now.head.state_number));
   map.showPlan(problem, plan, { underWay: !proposal });
+  parts.happened.shapes.draw();
 }
 
 function markSelection() {
