@@ -259,7 +259,7 @@ class TransferQmixParameters(_ModalParameters):
         ge=0,
         le=MAX_REPLANS,
         description="Sampled roll-outs of two to six UAVs in what the others of the best plan leave; null: "
-        "three for each of samples",
+        "three for each of samples where no polish follows, else none",
     )
     recombine: Annotated[bool | None, _SERVICE] = Field(
         default=None,

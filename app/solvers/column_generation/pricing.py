@@ -31,7 +31,7 @@ _PIECE = 1_000
 """Labels extended between two looks at the clock: some milliseconds."""
 
 _EFFORT = 100_000
-"""Labels in a combination of a search, whatever the time."""
+"""Labels after which no more routes are asked for at a time, whatever the time."""
 
 _BATCH = 60
 """Routes of a kind of UAV that are taken at a time."""
@@ -89,6 +89,8 @@ class Pricing:
         self._worth = worth(arrays)
         self._gain = _GAIN * float(self._worth.max(initial=0.0))
         self._idle, self._effort = idle_cost(arrays), effort
+        self.left = np.inf
+        """How many labels may be made from now on, about."""
         self.bound = np.inf
         """What no choice of whole routes exceeds, whether they are in the pool or not."""
 
@@ -137,10 +139,11 @@ class Pricing:
             return None
         exact, effort = False, 0
         relaxed = packing.relax()
-        while relaxed is not None and effort < self._effort and not ended():
+        while relaxed is not None and effort < self._effort and self.left > 0 and not ended():
             promised = max(0.0, relaxed.reward - packing.better_than(best))
             turn = self._ask(ng, packing, relaxed, promised, exact, ended)
             effort += turn.labels
+            self.left -= turn.labels
             if turn.grew:
                 relaxed, exact = packing.relax(), False
             elif not thorough or self.bound <= relaxed.reward + self._gain:
@@ -180,7 +183,7 @@ class Pricing:
             elif exact:
                 cycles = _most(value, least + self._gain, _CYCLES)
                 remembered |= remember(ng, labels, cycles) > 0
-            if ended():
+            if ended() or made >= self.left:
                 # The others come first next time.
                 self._kinds = self._kinds[asked:] + self._kinds[:asked]
                 return _Turn(made, grew, remembered)

@@ -34,6 +34,9 @@ _PRICED, _DIVED, _DIVED_ON = 0.5, 0.75, 0.9
 _DIVES, _DIVES_UNLIMITED = 8, 3
 """Further dives, at most, once routes are chosen; likewise."""
 
+_LABELS_UNLIMITED = 50_000
+"""Labels that a combination may ask for routes with where no time limit keeps it short: some tenths of a second."""
+
 _OFTEN = 0.3
 """Share of the time so far up to which routes are combined whenever the pool is half full."""
 
@@ -111,7 +114,8 @@ class Combination:
 
     def _combine(self, seconds: float, stop: StopCriterion) -> None:
         """Ask for the routes that are missing, and make the best choice of routes the incumbent."""
-
+        if self._unlimited:
+            self._pricing.left = _LABELS_UNLIMITED
         priced, dived, dived_on, ended = (
             EarlierOf(stop, Deadline(share * seconds)) for share in (_PRICED, _DIVED, _DIVED_ON, 1.0)
         )

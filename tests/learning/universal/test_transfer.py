@@ -263,9 +263,9 @@ def test_what_was_used_comes_back(store):
     default = effort(compile_problem(problem))
     used = solve(store, problem).parameters
     assert (used.samples, used.n_epochs, used.polish) == (default.samples, default.n_epochs, True)
-    assert used.replans == 3 * default.samples
+    assert used.replans == 0
     assert used.polish_moves == default.polish_moves
-    some = {**SOME, "replans": 15, "polish": True, "orders": default.orders, "recombine": True}
+    some = {**SOME, "replans": 0, "polish": True, "orders": default.orders, "recombine": True}
     assert solve(store, problem, **SOME).parameters == TransferQmixParameters(**some).in_service()
     assert solve(store, problem, **SOME, replans=4).parameters.replans == 4
     assert solve(store, problem, **{**BARE, "samples": 5}).parameters.replans == 15

@@ -265,7 +265,9 @@ def fill_in(parameters: TransferQmixParameters, default: Effort) -> Used:
     polished = parameters.polish is not False
     moves = default.polish_moves if parameters.polish_moves is None else parameters.polish_moves
     moves = moves if polished else 0
-    replans = REPLANS_A_SAMPLE * samples if parameters.replans is None else parameters.replans
+    # A local search finds what they would, in less time.
+    replans = 0 if moves else REPLANS_A_SAMPLE * samples
+    replans = replans if parameters.replans is None else parameters.replans
     single = orders == 1 and not (samples or replans or n_epochs)
     recombine = not single if parameters.recombine is None else parameters.recombine
     filled = parameters.in_service().model_copy(
