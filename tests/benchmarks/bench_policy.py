@@ -32,6 +32,7 @@ from library_on_trial import library_of, policies_for_every_size  # noqa: E402
 from app.domain.problem import Problem  # noqa: E402
 from app.learning.parameters import TransferQmixParameters  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
+from app.learning.universal.training.curriculum import with_greedy_unloading  # noqa: E402
 from app.simulation.drawn_generator import drawn, drawn_size  # noqa: E402
 from app.simulation.drawn_surroundings import with_surroundings  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
@@ -124,8 +125,9 @@ KINDS = {
 
 
 def problem_of(kind: str, number: int) -> Problem:
-    """Return the problem of a number."""
-    return KINDS[kind](number, np.random.default_rng([STREAM, number, *kind.encode()]))
+    """Return the problem of a number, without planned unloading: the policy decides where UAVs fly."""
+    rng = np.random.default_rng([STREAM, number, *kind.encode()])
+    return with_greedy_unloading(KINDS[kind](number, rng))
 
 
 def reference(kind: str, number: int, seconds: float) -> float:
