@@ -26,11 +26,23 @@ export function areaDot({ urgent, met }) {
   return h("i", { class: `dot urgent-${urgent}${met >= 1 ? " met" : ""}` });
 }
 
-/** Draw a base: a house, with its name and stock beside it. */
-export function depotSymbol({ size, name, stock }) {
+/** How many UAVs wait at a place, in a corner of its symbol; nothing where none does. */
+function badge(count) {
+  return count ? h("span", { class: "count" }, String(count)) : null;
+}
+
+/** Draw a base: a house, with the number of UAVs that wait there. */
+export function depotSymbol({ size, count }) {
   const drawn = svg("svg", { viewBox: "0 0 24 24", width: size, height: size, class: "depot" });
   drawn.append(svg("path", { d: "M2 11 12 3l10 8v11H2z" }), svg("path", { class: "door", d: "M8 22v-7h8v7z" }));
-  return h("div", {}, drawn, h("span", { class: "depot-name" }, name, h("small", {}, stock)));
+  return h("div", {}, drawn, badge(count));
+}
+
+/** Draw a place where UAVs wait: a rotor cross on a disc, with their number. */
+export function startSymbol({ size, count }) {
+  const drawn = svg("svg", { viewBox: "0 0 24 24", width: size, height: size, class: "start" });
+  drawn.append(svg("circle", { cx: 12, cy: 12, r: 10.5 }), svg("path", { d: "M8 8 16 16M16 8 8 16" }), ...[[8, 8], [16, 8], [8, 16], [16, 16]].map(([cx, cy]) => svg("circle", { class: "rotor", cx, cy, r: 2.4 })));
+  return h("div", {}, drawn, badge(count));
 }
 
 /** Draw a UAV among very many: a square in its colour, hollow where it is returning. */

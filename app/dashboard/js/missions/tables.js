@@ -82,7 +82,7 @@ function areas() {
 function bases() {
   const table = new LiveTable("bases", [["Base"], ["Stock", true], ["Turnaround", true]]);
   const draw = ({ state: { problem } }) => table.show(problem[BASES] ?? [], (base) =>
-    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base), h("td", { class: "n" }, stockText(base.stock)), h("td", { class: "n" }, shown(base.turnaround ?? 0))));
+    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base), h("td", { class: "n" }, stockText(problem, base.stock)), h("td", { class: "n" }, shown(base.turnaround ?? 0))));
   return { title: "Bases", open: false, table, draw };
 }
 
