@@ -41,9 +41,10 @@ _MOST_NAMED = 24
 _STYLE = """
 body { font: 11pt/1.4 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 10mm auto }
 h1 { font-size: 17pt; margin: 0 0 1mm } h2 { font-size: 13pt; margin: 0 0 1mm }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }
-th, td { text-align: left; padding: 1mm 2mm; border-bottom: 1px solid #bbb }
-td.n, th.n { text-align: right } td { white-space: nowrap } td.why { white-space: normal }
+table { border-collapse: collapse; width: 100%; font-size: 9pt; font-variant-numeric: tabular-nums }
+th, td { text-align: left; padding: 1mm 1.2mm; border-bottom: 1px solid #bbb }
+td.n, th.n { text-align: right } td { white-space: nowrap } td:nth-child(2) { white-space: normal }
+td.why { white-space: normal }
 section { break-inside: avoid; margin: 6mm 0 } svg { width: 100%; border: 1px solid #bbb }
 .key { display: inline-block; width: 3mm; height: 3mm; margin-right: 2mm } p { margin: 1mm 0 3mm }
 .done { width: 14mm }
@@ -280,16 +281,16 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
             yield (
                 f'<text x="{x_a + _NAME_AT * (x_b - x_a):.1f}" y="{y_a + _NAME_AT * (y_b - y_a):.1f}" '
                 f'font-weight="bold" stroke="#fff" stroke-width="3" paint-order="stroke" '
-                f'fill="{_colour(route)}">{escape(called(route.uav))}</text>'
+                f'fill="{_colour(route)}">{escape(route.uav.name or route.uav.id)}</text>'
             )
     for target in problem.targets:
         x, y = at(target.x, target.y)
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#fff" stroke="#111"/>'
-        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(called(target))}</text>'
+        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(target.name or target.id)}</text>'
     for base in problem.bases:
         x, y = at(base.x, base.y)
         yield f'<path d="M{x - 5:.1f} {y - 5:.1f}h10v10h-10z" fill="#fff" stroke="#111" stroke-width="2"/>'
-        yield f'<text x="{x + 8:.1f}" y="{y + 3:.1f}">{escape(called(base))}</text>'
+        yield f'<text x="{x + 8:.1f}" y="{y + 3:.1f}">{escape(base.name or base.id)}</text>'
     for x_s, y_s in {(uav.x_s, uav.y_s) for uav in problem.uavs}:
         x, y = at(x_s, y_s)
         yield f'<path d="M{x:.1f} {y - 6:.1f}l5 9h-10z" fill="#111"/>'

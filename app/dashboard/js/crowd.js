@@ -11,5 +11,5 @@ export function crowdList(uavs, chosen) {
   const list = h("ul", { class: "crowd-list" });
   const item = (uav) => h("li", {}, h("button", { type: "button", class: "quiet", dataset: { uavId: uav.id }, onclick: () => chosen(uav) }, paint(h("span", { class: "key", "aria-hidden": "true" }), uav.id), called(uav)));
   new Portions(list, uavs, item, (button) => h("li", {}, button));
-  return h("div", {}, h("h3", {}, filledText("{count} UAVs wait here", { count: uavs.length })), list);
+  return h("div", {}, h("p", { class: "hint" }, filledText("{count} UAVs wait here", { count: uavs.length })), list);
 }

@@ -11,7 +11,7 @@ const LEVELS = [1, 3, 5];
 function meanings() {
   const line = (kind) => svg("svg", { viewBox: "0 0 30 12", width: 30, height: 12 }, svg("path", { d: "M1 6H29", class: kind }));
   return [
-    [LEVELS.map((urgent) => areaSymbol({ urgent, met: 0, size: 18 })), "Area: the disc is redder, the more urgent it is"],
+    [LEVELS.map((urgent) => areaSymbol({ urgent, met: 0, size: 18 })), "Area: the more urgent, the larger and redder its disc"],
     [[areaSymbol({ urgent: 3, met: 0.6, size: 18 })], "Its ring fills with what it gets"],
     [[uavSymbol(SOME_UAV, 15)], "UAV that flies: the bar is the range left"],
     [[uavSymbol({ ...SOME_UAV, ret: true }, 15)], "UAV that is returning: hollow"],

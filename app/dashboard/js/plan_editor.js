@@ -7,9 +7,15 @@ import { beginWith, changeDraft, dropDraft, judgeAgain, keepDraft } from "./draf
 import { lockedCount } from "./locks.js";
 import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
+import { counted, filled, filledText } from "./sentences.js";
 import { get, select, set } from "./state.js";
 import { baseOf, placesOf } from "./stops.js";
 import { moment } from "./units.js";
+
+const BROKEN = {
+  one: "One visit breaks a rule, and it would not be flown:",
+  other: "{count} visits break a rule, and each would not be flown:",
+};
 
 /** What the service says of the draft, and what can become of it. */
 export function judgement(problem, answer, draft) {
@@ -17,9 +23,9 @@ export function judgement(problem, answer, draft) {
   const legal = Boolean(evaluation);
   const difference = legal ? evaluation.reward - answer.reward : 0;
   let says;
-  if (trouble) says = ["The plan is not judged yet: ", trouble, ". What you changed is kept. ", h("button", { type: "button", onclick: judgeAgain }, "Ask again")];
-  else if (refusal) says = [refusal.breaches.length ? `${refusal.breaches.length === 1 ? "One visit breaks" : `${refusal.breaches.length} visits break`} a rule, and ${refusal.breaches.length === 1 ? "it" : "each"} would not be flown:` : refusal.detail];
-  else if (legal) says = ["Reward ", number(evaluation.reward), ", ", h("strong", {}, h("data", { value: String(difference) }, `${difference < 0 ? "" : "+"}${shown(difference)}`)), " to the plan before."];
+  if (trouble) says = [...filled("The plan is not judged yet: {trouble}. What you changed is kept.", { trouble }), " ", h("button", { type: "button", onclick: judgeAgain }, "Ask again")];
+  else if (refusal) says = refusal.breaches.length ? filled(counted(refusal.breaches.length, BROKEN), { count: refusal.breaches.length }) : [refusal.detail];
+  else if (legal) says = filled("Reward {reward}, {difference} to the plan before.", { reward: number(evaluation.reward), difference: h("strong", {}, h("data", { value: String(difference) }, `${difference < 0 ? "" : "+"}${shown(difference)}`)) });
   else says = ["The service is asked …"];
   const button = (title, act, needs = true) => h("button", { type: "button", disabled: !needs, onclick: act }, title);
   return h("section", { class: "card block", id: "draft", "data-judged": legal ? "legal" : refusal ? "refused" : trouble ? "trouble" : "asking" },
@@ -81,7 +87,7 @@ export class PlanEditor {
 
   #rows(uav, i) {
     const key = paint(h("span", { class: "key", "aria-hidden": "true" }), uav.id);
-    const add = h("button", { type: "button", class: "quiet", "aria-label": `Add a visit to ${called(uav)}`, dataset: { act: "add" }, onclick: ({ target }) => this.#ask(target, { uav: i, at: this.visits[i].length }, null) }, "Add…");
+    const add = h("button", { type: "button", class: "quiet", "aria-label": filledText("Add a visit to {uav}", { uav: called(uav) }), dataset: { act: "add" }, onclick: ({ target }) => this.#ask(target, { uav: i, at: this.visits[i].length }, null) }, "Add…");
     return [
       h("tr", { class: "head", dataset: { uavId: uav.id, uav: i } }, h("th", { scope: "row", colspan: "3" }, h("button", { type: "button", class: "quiet", title: uav.id, onclick: () => select({ kind: "uavs", id: uav.id }) }, key, called(uav))), h("td", { class: "acts" }, add)),
       ...this.visits[i].map((id, at) => this.#visit(uav, i, id, at)),
@@ -90,7 +96,7 @@ export class PlanEditor {
 
   #visit(uav, i, id, at) {
     const name = this.nameOf(id);
-    const act = (sign, what, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": `${what}: ${name}, visit ${at + 1} of ${called(uav)}`, title: what, dataset: { act: what }, disabled: !possible, onclick: does }, sign);
+    const act = (sign, what, does, possible = true) => h("button", { type: "button", class: "quiet", "aria-label": filledText("{act}: {area}, visit {number} of {uav}", { act: what, area: name, number: at + 1, uav: called(uav) }), title: what, dataset: { act: what }, disabled: !possible, onclick: does }, sign);
     const to = (place, what) => this.#change(withMoved(this.visits, { uav: i, at }, { uav: i, at: place }), { uav: i, at: place, act: what });
     return h("tr", { draggable: "true", dataset: { uavId: uav.id, uav: i, at, targetId: id } },
       h("td", { class: "n" }, String(at + 1)), h("td", { title: baseOf(id) ?? id }, name, at < lockedCount(uav, this.visits[i]) && [" ", h("span", { class: "chip" }, "locked")]), h("td", { class: "num" }, "–"),

@@ -5,7 +5,7 @@ import { h, svg } from "./dom.js";
 import { rangeShare } from "./plan.js";
 
 /**
- * Draw an area: a disc in the colour of its urgency, a ring that fills with what is met.
+ * Draw an area: a disc in the colour of its urgency, larger the more urgent it is, a ring that fills with what is met.
  * @param {{urgent: number, met: number, size: number}} facts urgency class 1 to 5, share met, size in pixels
  */
 export function areaSymbol({ urgent, met, size }) {
@@ -16,7 +16,7 @@ export function areaSymbol({ urgent, met, size }) {
     "stroke-dasharray": `${(met * around).toFixed(2)} ${around.toFixed(2)}`,
   });
   const drawn = svg("svg", { viewBox: `0 0 ${size} ${size}`, width: size, height: size, class: `area urgent-${urgent}` });
-  drawn.append(svg("circle", { class: "need", cx: size / 2, cy: size / 2, r }), svg("circle", { class: "disc", cx: size / 2, cy: size / 2, r: r * 0.55 }));
+  drawn.append(svg("circle", { class: "need", cx: size / 2, cy: size / 2, r }), svg("circle", { class: "disc", cx: size / 2, cy: size / 2, r: r * (0.3 + 0.08 * urgent) }));
   if (met > 0) drawn.append(ring);
   return drawn;
 }

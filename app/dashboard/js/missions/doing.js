@@ -1,9 +1,10 @@
 /** What the UAVs of a mission do at its clock: from its state and the plan in force, as the service says them. */
 
-import { shown } from "../dom.js";
 import { stateOf } from "../plan.js";
+import { filledText } from "../sentences.js";
 import { isReload, placeOf } from "../stops.js";
 import { timesOf } from "../times.js";
+import { momentText } from "../units.js";
 
 /** The problem of a state as it is drawn: UAVs are where they were seen since, and those that are lost are out. */
 export function asSeen(state, positions, stateNumber) {
@@ -27,20 +28,22 @@ export function doing(uav, route, state, nameOf) {
   const { clock } = state;
   const aloft = stateOf(uav) !== "at its base";
   const last = state.done.findLast((each) => each.uav_id === uav.id);
+  const at = (time) => momentText(state.problem, time);
   if ((uav.available_from ?? 0) > clock) {
-    const until = `until ${shown(uav.available_from)}`;
-    if (!last) return `waits ${until}`;
-    const place = placeOf(last.base_id ? { kind: "reload", base_id: last.base_id } : last);
-    return last.base_id ? `reloads at ${nameOf(place)} ${until}` : `at ${nameOf(place)} ${until}`;
+    const time = at(uav.available_from);
+    if (!last) return filledText("waits until {time}", { time });
+    const place = nameOf(placeOf(last.base_id ? { kind: "reload", base_id: last.base_id } : last));
+    return filledText(last.base_id ? "reloads at {place} until {time}" : "at {place} until {time}", { place, time });
   }
   const [next] = route?.stops ?? [];
   if (next) {
     const { stops: [first] } = timesOf(uav, route, new Map(state.problem.targets.map((target) => [target.id, target])));
-    if (first.waits?.onGround) return `takes off at ${shown(first.left)} to ${nameOf(first.id)}`;
-    return `to ${nameOf(first.id)}, there at ${shown(first.arrival)}`;
+    const place = nameOf(first.id);
+    if (first.waits?.onGround) return filledText("takes off at {time} to {place}", { time: at(first.left), place });
+    return filledText("to {place}, there at {time}", { place, time: at(first.arrival) });
   }
   if (uav.ret) return "flies home";
-  if (aloft && (route?.landing?.time ?? clock) > clock) return `flies home, there at ${shown(route.landing.time)}`;
+  if (aloft && (route?.landing?.time ?? clock) > clock) return filledText("flies home, there at {time}", { time: at(route.landing.time) });
   return aloft ? "has landed" : "at its base";
 }
 

@@ -1,6 +1,7 @@
 /** Plans that were proposed for a mission: what each changes and gains, to accept or to refuse. */
 
-import { amounts, h, notify, number } from "../dom.js";
+import { h, notify, number } from "../dom.js";
+import { amountsCell } from "../materials.js";
 import { names } from "../plan.js";
 import { get } from "../state.js";
 import { brought } from "./doing.js";
@@ -68,7 +69,7 @@ export class Proposals {
           h("tr", { dataset: { uav: each.uav_id } }, h("th", { scope: "row" }, each.uav_id), h("td", { class: "wide" }, list(each.before)), h("td", { class: "wide" }, list(each.after))))))),
       h("details", {}, h("summary", {}, `What ${moved.length} ${moved.length === 1 ? "area gets" : "areas get"}`),
         h("table", { "data-testid": "proposal-areas" }, head(["Area", "In force", "Proposed"]), h("tbody", {}, moved.map(({ id }) =>
-          h("tr", { dataset: { area: id } }, h("th", { scope: "row" }, nameOf(id)), h("td", {}, amounts(now.get(id) ?? nothing)), h("td", {}, amounts(then.get(id) ?? nothing))))))));
+          h("tr", { dataset: { area: id } }, h("th", { scope: "row" }, nameOf(id)), h("td", {}, amountsCell(problem, now.get(id) ?? nothing)), h("td", {}, amountsCell(problem, then.get(id) ?? nothing))))))));
   }
 
   async #answer(button, type, proposal) {

@@ -10,7 +10,8 @@ import { editorOf, judgement } from "../plan_editor.js";
 import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { routesTable } from "../routes_table.js";
-import { get, select, set, subscribe } from "../state.js";
+import { filled, filledText } from "../sentences.js";
+import { get, set, subscribe } from "../state.js";
 import { startTime } from "../start_time.js";
 import { timeline } from "../timeline.js";
 import { unmetList } from "../unmet_list.js";
@@ -20,9 +21,10 @@ const long = { routes: null, unmet: null, timeline: null };
 function source(answer) {
   if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, "A plan that was changed by hand");
   const policy = answer.source_policy;
-  const how = [`${answer.algorithm}, seed ${answer.seed} `, answeredBy(answer)];
+  const how = [filledText("{algorithm}, seed {seed}", answer), " ", answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
-  return h("p", { class: "hint", id: "source" }, how, ". Policy ", h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
+  return h("p", { class: "hint", id: "source" }, how, " ",
+    filled("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) }));
 }
 
 /** Do something to the plan on screen, in a line of its own below the figures. */
