@@ -89,6 +89,21 @@ def test_no_refusal_and_no_message_breaks_a_rule(audited):
     expect(page.locator("#alerts .notice")).to_have_count(0)
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_neither_the_legend_nor_the_list_of_a_place_breaks_a_rule(audited, scheme):
+    page = audited
+    page.emulate_media(color_scheme=scheme)
+    legend = page.locator(".legend summary")
+    legend.click()
+    page.locator(".symbol.starts").click()
+    expect(page.locator(".crowd-list button").first).to_be_visible()
+    found = violations(page)
+    legend.click()
+    page.locator(".leaflet-popup-close-button").click()
+
+    assert found == []
+
+
 def test_no_zone_breaks_a_rule(audited):
     page = audited
     page.evaluate(

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
 from app.api.plan_formats.mission import AltitudeReference
-from app.api.plan_formats.printed_text import called, clock, position_text
+from app.api.plan_formats.printed_text import called, position_text
+from app.domain.clock import clock
 
 _MEASURED_FROM = {AltitudeReference.HOME: "its start", AltitudeReference.TERRAIN: "the ground below"}
 

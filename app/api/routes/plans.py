@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime
 from enum import StrEnum
 from typing import Annotated
 
@@ -241,6 +242,16 @@ async def get_plan(
             description="With delivery=payload-place: m it may go down to find the ground; 0: no limit",
         ),
     ] = 0.0,
+    title: Annotated[
+        str | None, Query(max_length=200, description="html: what stands above the plan; default: its id")
+    ] = None,
+    begins: Annotated[
+        datetime | None,
+        Query(
+            description="html: when the plan begins, by the clock where it is flown, as `2026-03-01T07:30`; "
+            "times are of the day then. Default: they count from the begin"
+        ),
+    ] = None,
 ) -> Response:
     """Write a plan in a format of the field.
 
@@ -264,16 +275,24 @@ async def get_plan(
     own = {uav_id: float(metres) for uav_id, _, metres in told}
     separation = Separation(altitude_step, launch_interval, own, altitude_reference)
     job = await services.jobs.get(job_id)
-    return await run_in_threadpool(_file, job, format, uav, choices, separation)
+    return await run_in_threadpool(_file, job, format, uav, choices, separation, title, begins)
 
 
 def _file(
-    job: Job, format: PlanFormat, uav: str | None, choices: FlightChoices, separation: Separation
+    job: Job,
+    format: PlanFormat,
+    uav: str | None,
+    choices: FlightChoices,
+    separation: Separation,
+    title: str | None,
+    begins: datetime | None,
 ) -> Response:
     answer = result_of(job)
     if answer is None or "routes" not in answer:
         raise NoPlan(job.id, job.kind, job.status.value)
     plan = flown_plan(problem_from_record(job.payload["problem"]), answer)
+    if format is PlanFormat.HTML:
+        plan = replace(plan, title=title, begins=begins)
     kind = _FORMATS[format]
     if isinstance(kind, _Document):
         # A page is looked at in the browser, everything else is kept.

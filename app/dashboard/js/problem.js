@@ -85,6 +85,12 @@ export function move(kind, id, { x, y }) {
   return update(kind, id, uav.x_c === undefined && uav.y_c === undefined ? { x_s: x, y_s: y } : { x_c: x, y_c: y });
 }
 
+/** Move UAVs that wait at one place to another, all together. @param {string[]} ids */
+export function moveStarts(ids, { x, y }) {
+  const moved = new Set(ids);
+  edit((problem) => ({ uavs: problem.uavs.map((uav) => (moved.has(uav.id) ? { ...uav, x_s: x, y_s: y, ...(uav.x_c === undefined ? {} : { x_c: x }), ...(uav.y_c === undefined ? {} : { y_c: y }) } : uav)) }));
+}
+
 /** Place a new UAV, area or base; it resembles the last of its kind. */
 export function place(kind, { x, y }) {
   const { problem } = get();

@@ -10,6 +10,7 @@ let state = Object.freeze({
   problem: null,
   problemName: "",
   opened: "",
+  begins: null,
   colours: {},
   past: [],
   future: [],

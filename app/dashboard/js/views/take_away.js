@@ -6,6 +6,7 @@ import { names } from "../plan.js";
 import { outOfDate, staleNote } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { get, subscribe } from "../state.js";
+import { beginOnTheWall } from "../units.js";
 
 const DELIVERIES = [
   ["payload-place", "Place the payload (NAV_PAYLOAD_PLACE)"],
@@ -29,6 +30,9 @@ const DOCUMENTS = [
 ];
 
 const ASK = "The problem was changed after this plan. Save the plan as it was made?";
+
+/** Of a printed page, as the service takes it. */
+const LONGEST_TITLE = 200;
 
 let parts = null;
 
@@ -73,7 +77,7 @@ function mount(root) {
     parts.state,
     h("section", { class: "card" }, h("h3", {}, "Flight files"), parts.form, parts.flight),
     h("section", { class: "card" }, h("h3", {}, "The whole plan"), parts.documents));
-  subscribe(["answer", "answerProblem"], draw);
+  subscribe(["answer", "answerProblem", "begins", "opened", "problemName"], draw);
   draw();
 }
 
@@ -94,7 +98,7 @@ function draw() {
   const link = parts.documents.querySelector("a");
   // A new tab has no key to ask with.
   link.hidden = !answer || hasKey();
-  if (answer) link.href = address(`jobs/${answer.job_id}/plan?format=html`);
+  if (answer) link.href = address(`jobs/${answer.job_id}/plan?${new URLSearchParams({ format: "html", ...heading() })}`);
   parts.state.textContent = !answer
     ? "Allocate first: there is no plan yet."
     : geographic
@@ -102,10 +106,17 @@ function draw() {
       : "This problem's crs is local; flight files need wgs84 (longitudes and latitudes). The other files have the local x and y.";
 }
 
+/** What stands above a printed page: what the problem is called, and when the plan begins. */
+function heading() {
+  const title = get().problemName.slice(0, LONGEST_TITLE);
+  const begins = beginOnTheWall();
+  return { ...(title ? { title } : {}), ...(begins ? { begins } : {}) };
+}
+
 async function take(format) {
   if (outOfDate() && !confirm(ASK)) return;
   const { answer } = get();
-  const asked = new URLSearchParams({ format });
+  const asked = new URLSearchParams({ format, ...(format === "html" ? heading() : {}) });
   const flight = FILES.some(([name]) => name === format);
   for (const { control, made } of parts.rows.values()) {
     made.querySelector(".error").textContent = "";
