@@ -7,6 +7,7 @@ import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
 import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
+import { watchIntake } from "./intake.js";
 import { keepProblem, restore } from "./keep.js";
 import { DispatchMap } from "./map.js";
 import { lastOpen, openMission } from "./missions/feed.js";
@@ -208,6 +209,7 @@ async function start() {
   keepColours();
   judgeDrafts();
   keepUntold();
+  watchIntake();
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();
