@@ -3,7 +3,7 @@
 import httpx
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
-from dashboard_steps import PATIENCE_MS, begin_again, go, open_problem, ready, show_answer, state
+from dashboard_steps import ADVANCED, PATIENCE_MS, begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 
 from app.api.openapi_examples import example_problem
@@ -29,6 +29,7 @@ def auditing(browser, service):
         viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
     )
     context.set_default_timeout(PATIENCE_MS)
+    context.add_init_script(ADVANCED)
     page = context.new_page()
     page.goto(service.url)
     page.evaluate(AXE_SCRIPT)

@@ -130,7 +130,7 @@ def test_faults_name_the_line_and_the_column_and_show_a_right_row(make):
         "line 3: `latitude (lat)` is 95: it has to be from -90 to 90",
         "line 4: `latitude` is empty",
         "line 5: `longitude (lon)` is no number: east",
-        "line 6: `need 1 (need)` is -3: it has to be from 0 to 1000000000000",
+        "line 6: `need 1 (need)` is -3: it has to be at least 0",
         "line 7: `latitude (lat)` is ambiguous: line 2 has a decimal comma, 1,5: 1.5",
     ]
     assert [target["name"] for target in found["problem"]["targets"]] == ["A"]

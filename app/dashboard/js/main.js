@@ -18,7 +18,7 @@ import { openPlan } from "./recent.js";
 import { allViews } from "./registry.js";
 import { fieldsOf } from "./schema.js";
 import { get, set, subscribe } from "./state.js";
-import { allocateNow } from "./views/allocate.js";
+import { planNow } from "./views/allocate.js";
 import "./views/index.js";
 
 const FIRST_EXAMPLE = "cyclone-idai";
@@ -131,8 +131,7 @@ function onKeys(event) {
     if (map.drawing && !event.shiftKey) map.drawing.takeBack();
     else (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
-    set({ view: "allocate" });
-    allocateNow();
+    planNow();
   } else if (event.key === "Escape" && !typing) {
     map.stopPlacing();
     set({ selection: null });

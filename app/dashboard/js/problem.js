@@ -1,6 +1,7 @@
 /** The problem on screen: making, editing, undoing. All of it in the API's own fields. */
 
 import { notify } from "./dom.js";
+import { TYPES } from "./fleet_types.js";
 import { change } from "./history.js";
 import { BASES, STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
@@ -84,13 +85,13 @@ export function move(kind, id, { x, y }) {
   return update(kind, id, uav.x_c === undefined && uav.y_c === undefined ? { x_s: x, y_s: y } : { x_c: x, y_c: y });
 }
 
-/** What a new UAV, area or base has besides its place: it resembles the last of its kind. */
+/** What a new UAV, area or base has besides its place: it resembles the last of its kind. The first UAV on the globe is of the first type. */
 export function newItem(kind, problem) {
   const last = problem[kind]?.at(-1);
   if (kind === BASES) return last?.turnaround === undefined ? {} : { turnaround: last.turnaround };
   const amounts = (first) => (last ? [...last.loadlist] : new Array(materials(problem)).fill(first));
   if (kind !== "uavs") return { level: last?.level ?? 1, loadlist: amounts(5) };
-  const first = { speed: 1, voyage: reach(problem), load: 10 };
+  const first = problem.crs === "wgs84" ? TYPES[0] : { speed: 1, voyage: reach(problem), load: 10 };
   return { speed: last?.speed ?? first.speed, voyage: last?.voyage ?? first.voyage, loadlist: amounts(first.load) };
 }
 
@@ -132,10 +133,9 @@ export function freeId(kind, items) {
   return `${STEMS[kind]}-${n}`;
 }
 
-/** A range that a first UAV is given: three times across the areas, or as far as a plain number goes. */
+/** A range that a first UAV on a plane is given: three times across the areas. */
 function reach(problem) {
   const box = extent(problem);
-  if (problem.crs === "wgs84") return 100;
   return box ? 3 * Math.hypot(box.maxX - box.minX, box.maxY - box.minY) || 3 : 3;
 }
 

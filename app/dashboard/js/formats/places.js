@@ -2,7 +2,8 @@
 
 import { amountTitle, fieldTitle } from "../columns.js";
 import { BASES, POINTS, ZONE } from "../kinds.js";
-import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
+import { beyond, DEGREES, onEarth } from "../limits.js";
+import { amountsOf, isWords, itemFields } from "../schema.js";
 import { wordsIn } from "../words.js";
 import { list, NUMBER, Numbers, plainText } from "./cells.js";
 import { FormatError } from "./error.js";
@@ -17,8 +18,6 @@ import { meant } from "./names.js";
 
 /** Values of a right line, by field. */
 const RIGHT = { id: "A1", name: "Dondo", y: "-19.61", x: "34.74", speed: "100", voyage: "150", level: "2" };
-const PLACES = ["x", "y", "x_s", "y_s"];
-const DEGREES = { x: 180, y: 90 };
 
 /**
  * Find a list of places.
@@ -87,12 +86,6 @@ export function choices(fields, kind, count, globe) {
   const single = Object.entries(of).filter(taken).map(([name, schema]) => ({ name, title: fieldTitle(kind, name, globe), schema: onEarth(name, schema, globe), needed: schema.needed }));
   const amounts = Array.from({ length: count }, (_, k) => ({ name: `${carried}/${k}`, title: amountTitle(kind, carried, k, globe), schema: of[carried].items, needed: of[carried].needed && k === 0 }));
   return [...single, ...amounts];
-}
-
-/** A position's schema, with the ends of the globe. */
-function onEarth(name, schema, globe) {
-  const most = globe && PLACES.includes(name) && DEGREES[name[0]];
-  return most ? { ...schema, minimum: -most, maximum: most } : schema;
 }
 
 /** What a list is of, by its columns. @param {Sheet} sheet */
@@ -190,9 +183,8 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
     if (isWords(schema)) return wordsIn(plainText(text)) ?? refuse(line, column, text, "a list of words, such as medic; night flight, is needed");
     if (schema.type === "string") return plainText(text);
     const value = numbers.read(text, line, column);
-    const { minimum = -Infinity, maximum = Infinity, exclusiveMinimum = -Infinity } = schema;
-    if (value < minimum || value > maximum) refuse(line, column, text, Number.isFinite(minimum) && Number.isFinite(maximum) ? `it has to be from ${minimum} to ${maximum}` : Number.isFinite(minimum) ? `it has to be at least ${minimum}` : `it has to be at most ${maximum}`);
-    if (value <= exclusiveMinimum) refuse(line, column, text, `it has to be more than ${exclusiveMinimum}`);
+    const limit = beyond(value, schema);
+    if (limit) refuse(line, column, text, limit);
     return value;
   }
 

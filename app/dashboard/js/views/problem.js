@@ -1,22 +1,26 @@
 /** The problem: examples, files, settings, what is selected; below the map a table of all UAVs and areas. */
 
+import { running } from "../allocation.js";
 import { json } from "../api.js";
 import { amountTitle, fieldTitle } from "../columns.js";
 import { download, h, notify, shown } from "../dom.js";
 import { Fields, labelled } from "../fields.js";
 import { toCsv, toGeoJson, toJson } from "../formats.js";
+import { fleetForm, moreLike } from "../fleet_form.js";
 import { Grid } from "../grid.js";
 import { redo, undo } from "../history.js";
 import { templateOf } from "../import_dialog.js";
 import { bring, NOT_SAID, said, takeFile } from "../intake.js";
 import { BASES, ZONES } from "../kinds.js";
+import { beyond, onEarth } from "../limits.js";
 import { edit, materials, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateOf } from "../plan.js";
 import { registerView } from "../registry.js";
 import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
-import { get, select, subscribe } from "../state.js";
+import { get, select, set, subscribe } from "../state.js";
 import { wordsIn, writtenWords } from "../words.js";
 import { cornersOf, drawingControls } from "../zone_form.js";
+import { planNow } from "./allocate.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
 const KINDS = { uavs: "UAVs", targets: "Areas", [BASES]: "Bases", [ZONES]: "Zones" };
@@ -59,10 +63,25 @@ function enter(kind, id, name, text) {
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
   if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(`${name} of ${id} needs a number`, "error");
-  if (k === undefined || value === undefined) return update(kind, id, { [field]: value });
-  // Amounts that were not set are those of the load until then; a base has none.
-  const before = item[field] ?? item.loadlist ?? new Array(materials(get().problem)).fill(0);
-  update(kind, id, { [field]: before.with(Number(k), value) });
+  if (k === undefined || value === undefined) update(kind, id, { [field]: value });
+  else {
+    // Amounts that were not set are those of the load until then; a base has none.
+    const before = item[field] ?? item.loadlist ?? new Array(materials(get().problem)).fill(0);
+    update(kind, id, { [field]: before.with(Number(k), value) });
+  }
+  markBeyond(kind, id);
+}
+
+/** Mark the numbers of an item that are beyond their limits; the service judges all else. */
+function markBeyond(kind, id) {
+  const { problem, fields } = get();
+  const at = problem[kind].findIndex((each) => each.id === id);
+  const globe = problem.crs === "wgs84";
+  const limit = (name, value, schema) => ({ pointer: `/${kind}/${at}/${name}`, detail: Number.isFinite(value) ? beyond(value, onEarth(name, schema, globe)) : null });
+  const found = Object.entries(itemFields(fields, kind)).flatMap(([name, schema]) =>
+    isAmounts(schema) ? (problem[kind][at][name] ?? []).map((value, k) => limit(`${name}/${k}`, value, schema.items)) : [limit(name, problem[kind][at][name], schema)]);
+  const violations = found.filter(({ detail }) => detail);
+  if (violations.length) set({ violations });
 }
 
 function mountTables(dock) {
@@ -142,6 +161,15 @@ function filesCard() {
   ];
 }
 
+/** The way from a problem to its plan. */
+function planning() {
+  const plan = h("button", { type: "button", class: "primary", id: "plan", title: "Ctrl+Enter", onclick: planNow }, "Plan");
+  const enable = () => { plan.disabled = running(get().job); };
+  subscribe(["job"], enable);
+  enable();
+  return h("div", { class: "row" }, plan, h("p", { class: "hint" }, "Finds who flies where, with what."));
+}
+
 function placing(map) {
   const button = (kind, title) => {
     const made = h("button", {
@@ -178,7 +206,7 @@ function mountInspector(root) {
       return labelled(column.title, input, { pointer: `/${kind}/${at}/${column.name}` });
     });
     const facts = kind === "uavs" ? `${stateOf(item)}, range left ${shown(rangeLeft(item), 6)} of ${shown(item.voyage, 6)}` : "";
-    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
+    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
   };
   subscribe(["selection", "problem", "fields"], draw);
   draw();
@@ -225,9 +253,10 @@ registerView({
     const inspector = h("div", {});
     const settings = h("div", { class: "block" });
     root.append(
+      planning(),
       h("div", { class: "block" }, h("h2", {}, "Examples"), examples),
       h("div", { class: "block" }, h("h2", {}, "Import and export"), ...filesCard()),
-      h("div", { class: "block" }, h("h2", {}, "Edit"), ...placing(map), inspector),
+      h("div", { class: "block" }, h("h2", {}, "Edit"), ...placing(map), fleetForm(map), inspector),
       h("details", {}, h("summary", {}, "Settings of the problem"), settings),
     );
     mountTables(dock);
