@@ -89,7 +89,8 @@ export function watchIntake() {
     field.hidden = true;
     if (!hasFile(event)) return;
     event.preventDefault();
-    const [file] = event.dataTransfer.files;
+    const [file, ...more] = event.dataTransfer.files;
+    if (more.length) notify(`One file is taken at a time: ${file.name}`);
     if (file) void takeFile(file);
   });
   document.addEventListener("paste", (event) => {
