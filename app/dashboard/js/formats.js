@@ -3,6 +3,7 @@
 import { FormatError } from "./formats/error.js";
 import { fromCsv, toCsv } from "./formats/csv.js";
 import { fromGeoJson, toGeoJson } from "./formats/geojson.js";
+import { sheetOf } from "./formats/places.js";
 import { textOf } from "./formats/text.js";
 import { BASES } from "./kinds.js";
 import { normalised } from "./problem.js";
@@ -10,10 +11,22 @@ import { itemFields, wanted } from "./schema.js";
 
 export { FormatError, toCsv, toGeoJson };
 
-const CALLED = { uavs: "UAV", targets: "area", [BASES]: "base" };
+export const CALLED = { uavs: "UAV", targets: "area", [BASES]: "base" };
 
 export function toJson(problem) {
   return `${JSON.stringify(problem, null, 2)}\n`;
+}
+
+/**
+ * Find a list of places in a file.
+ * @param {Uint8Array} bytes
+ * @returns {import("./formats/places.js").Sheet | null} null where it is a problem of any of the formats, or no list
+ * @throws {FormatError}
+ */
+export function readList(bytes) {
+  const { text, notices } = textOf(bytes);
+  const sheet = sheetOf(text);
+  return sheet && { ...sheet, notices: [...notices, ...sheet.notices] };
 }
 
 /**
@@ -81,7 +94,7 @@ function complete(problem, fields, notices) {
 }
 
 /** Number ids that are there before, as ids have to differ. */
-function distinct(items, what, longest, notices) {
+export function distinct(items, what, longest, notices) {
   const taken = new Set(items.map(({ id }) => id));
   const seen = new Set();
   const renamed = [];

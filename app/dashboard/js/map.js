@@ -2,6 +2,7 @@
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { Air } from "./air.js";
+import { addBackground } from "./background.js";
 import { Graticule } from "./graticule.js";
 import { bringIntoSight } from "./into_sight.js";
 import { BASES, ZONES } from "./kinds.js";
@@ -144,14 +145,9 @@ export class DispatchMap {
       crs: globe ? L.CRS.EPSG3857 : L.CRS.Simple,
       minZoom: globe ? 1 : -32, maxZoom: globe ? 20 : 32, zoomSnap: 0.25, zoomDelta: 0.5,
       zoomAnimation: !CALM.matches, markerZoomAnimation: !CALM.matches, inertia: !CALM.matches,
-      attributionControl: Boolean(globe && settings.tile_url), fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
+      attributionControl: false, fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
     });
-    this.map.attributionControl?.setPrefix(false);
-    if (globe && settings.tile_url) {
-      const attribution = document.createElement("span");
-      attribution.textContent = settings.tile_attribution;
-      L.tileLayer(settings.tile_url, { attribution: attribution.innerHTML, maxZoom: 20 }).addTo(this.map);
-    }
+    if (globe) addBackground(this.map, settings);
     new Graticule(globe).addTo(this.map);
     if (globe) L.control.scale({ imperial: false }).addTo(this.map);
     this.air = new Air(this.map, globe, (event, id) => this.#onZone(event, id));

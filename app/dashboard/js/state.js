@@ -25,7 +25,7 @@ let state = Object.freeze({
   selection: null,
   algorithms: [],
   fields: null,
-  settings: { version: "", tile_url: null, tile_attribution: "" },
+  settings: { version: "", tile_url: null, tile_attribution: "", overlay: null },
   view: "problem",
 });
 

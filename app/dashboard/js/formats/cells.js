@@ -7,7 +7,7 @@ const SEPARATORS = [",", ";", "\t", "|"];
 /** What a spreadsheet takes for a formula; such a text gets an apostrophe in front, and one more where it has some. */
 const FORMULA = /^'*[=+\-@\t\r]/;
 const ESCAPED = /^'+[=+\-@\t\r]/;
-const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+export const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 
 /** Write rows of values; texts are kept from becoming formulas. @param {(string | number | boolean)[][]} rows */
 export function toCells(rows) {
@@ -34,11 +34,9 @@ export function plainText(text) {
  * @throws {FormatError}
  */
 export function table(text, needed) {
-  const told = /^\s*"?sep=(.)"?[ \t]*(\r\n|\n|\r)/i.exec(text);
-  const body = told ? text.slice(told[0].length) : text;
-  const before = told ? told[0].split(/\r\n|\n|\r/).length - 1 : 0;
-  const separator = told ? told[1] : separatorOf(body, needed);
-  const [head, ...rows] = [...rowsOf(body, separator, before)].filter(({ cells }) => cells.some((cell) => cell.trim()));
+  const { separator: told, body, before } = toldSeparator(text);
+  const separator = told ?? separatorOf(body, needed);
+  const [head, ...rows] = filled(rowsOf(body, separator, before));
   if (!head) throw new FormatError("it is empty");
   const columns = head.cells.map((name) => name.trim().toLowerCase());
   if (!columns.includes(needed)) {
@@ -51,6 +49,46 @@ export function table(text, needed) {
     if (cells.slice(columns.length).some((cell) => cell.trim())) throw new FormatError(`line ${line}: it has ${cells.length} cells for ${columns.length} columns`);
   }
   return { separator, columns, rows: rows.filter(({ cells }) => !isTags(cells)) };
+}
+
+/** Separators of a list whose columns have no names that are known: a comma may be one of decimals. */
+const LIST_SEPARATORS = ["\t", ";", "|", ","];
+const LOOKED_AT = 50;
+
+/**
+ * Rows of a list of whatever columns.
+ * @param {string} text
+ * @returns {{separator: string, rows: {line: number, cells: string[]}[]}} without blank rows and a row of HXL tags
+ * @throws {FormatError} where a quote is out of place
+ */
+export function list(text) {
+  const told = toldSeparator(text);
+  const separator = told.separator ?? LIST_SEPARATORS.map((each) => ({ each, evenness: evenness(told.body, each) })).reduce((a, b) => (b.evenness > a.evenness ? b : a)).each;
+  return { separator, rows: filled(rowsOf(told.body, separator, told.before)).filter(({ cells }) => !isTags(cells)) };
+}
+
+/** The share of the first rows that have as many cells as most of them, of two or more. */
+function evenness(text, separator) {
+  const rows = filled(rowsOf(text, separator, 0, true), LOOKED_AT);
+  const counts = new Map();
+  for (const { cells: { length } } of rows) if (length > 1) counts.set(length, (counts.get(length) ?? 0) + 1);
+  return Math.max(0, ...counts.values()) / Math.max(1, rows.length);
+}
+
+function filled(rows, most = Infinity) {
+  const kept = [];
+  for (const row of rows) {
+    if (row.cells.some((cell) => cell.trim())) kept.push(row);
+    if (kept.length >= most) break;
+  }
+  return kept;
+}
+
+/** The separator that a first line `sep=` names, and what comes after that line. */
+function toldSeparator(text) {
+  const told = /^\s*"?sep=(.)"?[ \t]*(\r\n|\n|\r)/i.exec(text);
+  if (!told) return { separator: null, body: text, before: 0 };
+  return { separator: told[1], body: text.slice(told[0].length), before: told[0].split(/\r\n|\n|\r/).length - 1 };
 }
 
 /** A row that humanitarian data has below the names (HXL): each cell that is filled is a tag. */
@@ -89,9 +127,10 @@ function* rowsOf(text, separator, before, lax = false) {
 
 /** Reads the numbers of one file, whose decimals are either all points or all commas. */
 export class Numbers {
-  /** @param {string} separator of the file's cells */
-  constructor(separator) {
+  /** @param {string} separator of the file's cells @param {string} [row] what a row of it is called */
+  constructor(separator, row = "line") {
     this.separator = separator;
+    this.row = row;
     this.point = null;
     this.comma = null;
   }
@@ -107,7 +146,7 @@ export class Numbers {
     } else if (decimal === ".") this.point ??= cell;
     if (decimal && this.point && this.comma) {
       const [other, has] = decimal === "," ? [this.point, "point"] : [this.comma, "comma"];
-      this.#refuse(cell, `is ambiguous: line ${other.line} has a decimal ${has}, ${other.text}`);
+      this.#refuse(cell, `is ambiguous: ${this.row} ${other.line} has a decimal ${has}, ${other.text}`);
     }
     const value = decimal === "," ? plain.replace(",", ".") : plain;
     if (!NUMBER.test(value) || !Number.isFinite(Number(value))) this.#refuse(cell, "is no number");
@@ -115,6 +154,6 @@ export class Numbers {
   }
 
   #refuse({ text, line, column }, why) {
-    throw new FormatError(`line ${line}: \`${column}\` ${why}: ${text}`);
+    throw new FormatError(`${this.row} ${line}: \`${column}\` ${why}: ${text}`);
   }
 }

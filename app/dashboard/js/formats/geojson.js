@@ -95,14 +95,14 @@ function placed(kind, item, x, y) {
   return { ...item, [item.x_c === undefined ? "x_s" : "x_c"]: x, [item.y_c === undefined ? "y_s" : "y_c"]: y };
 }
 
-function nameOf(feature, at) {
-  const { id, name, Name } = feature?.properties ?? {};
-  const called = [feature?.id, id, name, Name].find((each) => each !== undefined && each !== null && each !== "");
+export function nameOf(feature, at) {
+  const { id, name, Name, NAME } = feature?.properties ?? {};
+  const called = [feature?.id, id, name, Name, NAME].find((each) => each !== undefined && each !== null && each !== "");
   return `feature ${at + 1}${called === undefined ? "" : ` (${called})`}`;
 }
 
 /** Refuse coordinates that are no degrees of WGS 84; without a `crs` they are (RFC 7946, 4). */
-function onGlobe(crs) {
+export function onGlobe(crs) {
   const name = crs?.properties?.name ?? crs?.properties?.code ?? crs?.properties?.href;
   if (crs === undefined || crs === null || DEGREES.test(String(name ?? ""))) return;
   throw new FormatError(`its \`crs\` is ${name ?? JSON.stringify(crs)}: save it with longitude and latitude on WGS 84 (EPSG:4326)`);
@@ -128,7 +128,7 @@ function listOf(value, schema) {
 }
 
 /** Where a feature is; of a polygon the middle, which is said. */
-function placeOf({ type, coordinates }, name, notices) {
+export function placeOf({ type, coordinates }, name, notices) {
   if (type === "Point") return pair(coordinates, name);
   if (type === "MultiPoint" && coordinates?.length === 1) return pair(coordinates[0], name);
   if (type === "Polygon" || type === "MultiPolygon") {

@@ -1,4 +1,4 @@
-/** Allocate: algorithm, parameters and limits as the service describes them; the reward climbing live. */
+/** Allocate: one button to plan, algorithm, parameters and limits as the service describes them for who wants them; the reward climbing live. */
 
 import { allocate, cancel, running } from "../allocation.js";
 import { beginningNotes } from "../beginning.js";
@@ -15,8 +15,16 @@ const KEEPING = "keep_checkpoint";
 const PREFERRED = ["auto", "transfer_qmix"];
 const OWN_FIELDS = new Set(["algorithm", "parameters", KEEPING]);
 const FIRST_LIMIT_S = 5;
+/** Where this browser keeps whether what is advanced is open: who works with it finds it open again. */
+const ADVANCED = "dispatch-advanced";
 const REDRAW_MS = 150;
 const SAY_EVERY_MS = 6000;
+
+/** What a search will do, in a sentence. @param {string} algorithm @param {number | string | undefined} limit seconds */
+function searchSaid(algorithm, limit) {
+  if (limit === undefined) return `The search (${algorithm}) has no time limit: it ends by itself, or when you stop it.`;
+  return `The search (${algorithm}) takes at most ${limit} s, and can be stopped before: the best plan so far is kept.`;
+}
 
 /** The form; returns it with a function that reads it. */
 function makeForm() {
@@ -26,9 +34,11 @@ function makeForm() {
   const first = PREFERRED.find((name) => names.includes(name)) ?? names[0];
   const choice = h("select", { name: "algorithm", onchange: () => choose() }, names.map((name) => h("option", { value: name, selected: name === first }, compared.has(name) ? `${name} (for comparison)` : name)));
   const summary = h("p", { class: "hint" });
+  const search = h("p", { class: "hint", id: "search" });
+  const say = () => { search.textContent = searchSaid(choice.value, limits.values().time_limit_s); };
   const place = h("div", {});
   const rest = Object.fromEntries(Object.entries(fields.request).filter(([name]) => !OWN_FIELDS.has(name)));
-  const limits = new Fields(rest, { pointer: "", values: { time_limit_s: FIRST_LIMIT_S } });
+  const limits = new Fields(rest, { pointer: "", values: { time_limit_s: FIRST_LIMIT_S }, onchange: () => say() });
   const kept = fields.request[KEEPING] ? { [KEEPING]: fields.request[KEEPING] } : {};
   const keeping = new Fields(kept, { pointer: "", titles: { [KEEPING]: "Keep what is learned" } });
   const learns = () => fields.learners.includes(choice.value);
@@ -39,15 +49,17 @@ function makeForm() {
     parameters = new Fields(algorithm.parameters.properties ?? {}, { pointer: "/parameters", defs: algorithm.parameters.$defs });
     place.replaceChildren(parameters.element);
     keeping.element.hidden = !learns();
+    say();
   };
   choose();
   const elsewhere = h("ul", { class: "violations", id: "violations" });
-  const start = h("button", { class: "primary", title: "Ctrl+Enter", id: "start" }, "Allocate");
+  const start = h("button", { class: "primary", title: "Ctrl+Enter", id: "start" }, "Plan");
   const stop = h("button", { type: "button", class: "danger", id: "cancel", onclick: cancel }, "Stop, keep the best");
+  const keepOpen = () => localStorage.setItem(ADVANCED, String(!advanced.open));
+  const advanced = h("details", { id: "advanced", open: localStorage.getItem(ADVANCED) === "true" }, h("summary", { onclick: keepOpen }, "Advanced"),
+    h("div", { class: "block" }, labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element, h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place)));
   const form = h("form", { id: "allocate-form", class: "block", novalidate: true },
-    labelled("Algorithm", choice, { pointer: "/algorithm" }), summary, limits.element, keeping.element,
-    h("details", { id: "parameters" }, h("summary", {}, "Parameters"), place), beginningNotes(), crossingNotes(),
-    h("div", { class: "row" }, start, stop), elsewhere);
+    h("div", { class: "row" }, start, stop), search, beginningNotes(), crossingNotes(), elsewhere, advanced);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const { job, problem } = get();
@@ -62,7 +74,7 @@ function makeForm() {
   const refuse = () => {
     const { violations } = get();
     const others = showViolations(form, violations);
-    if (violations.some(({ pointer }) => pointer.startsWith("/parameters"))) form.querySelector("details").open = true;
+    for (const closed of form.querySelectorAll("details:has([aria-invalid])")) closed.open = true;
     elsewhere.replaceChildren(...others.map(({ pointer, detail }) => h("li", { class: "error" }, wayTo(pointer, get().problem), ` ${detail}`)));
     form.querySelector("[aria-invalid]")?.focus();
   };
@@ -127,8 +139,9 @@ let redraw = () => {};
 let form = null;
 let wanted = false; // to allocate as soon as there is a form
 
-/** Allocate with what the form says. */
-export function allocateNow() {
+/** Go to this view and allocate with what its form says. */
+export function planNow() {
+  set({ view: "allocate" });
   if (form) form.requestSubmit();
   else wanted = true;
 }

@@ -1,0 +1,24 @@
+/** Limits of numbers, as the service's description has them, and those of the globe. */
+
+const PLACES = ["x", "y", "x_s", "y_s", "x_c", "y_c"];
+/** Degrees from the middle, by the letter that names of fields begin with. */
+export const DEGREES = { x: 180, y: 90 };
+
+/** The schema of a field, with the ends of the globe where it is a position there. */
+export function onEarth(name, schema, globe) {
+  const most = globe && PLACES.includes(name) && DEGREES[name[0]];
+  return most ? { ...schema, minimum: -most, maximum: most } : schema;
+}
+
+/** A minimum as small as this only keeps numbers from being 0, and a limit as large says nothing to anybody. */
+const TINY = 1e-9;
+const NO_LIMIT = 1e9;
+
+/** What a number has to be, where it is beyond its limits; null where it is not. @returns {string | null} */
+export function beyond(value, { minimum = -Infinity, maximum = Infinity, exclusiveMinimum = -Infinity }) {
+  if (value >= minimum && value <= maximum && value > exclusiveMinimum) return null;
+  const positive = minimum > 0 && minimum <= TINY;
+  if (positive || exclusiveMinimum > -Infinity) return `it has to be more than ${positive ? 0 : exclusiveMinimum}`;
+  if (minimum > -NO_LIMIT && maximum < NO_LIMIT) return `it has to be from ${minimum} to ${maximum}`;
+  return value < minimum ? `it has to be at least ${minimum}` : `it has to be at most ${maximum}`;
+}
