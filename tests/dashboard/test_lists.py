@@ -127,7 +127,7 @@ def test_degrees_are_told_by_names_and_values(make, text, globe):
 def test_faults_name_the_line_and_the_column_and_show_a_right_row(make):
     found = make("name;lat;lon;need\nA;1,5;2,5;3\nB;95;3;4\nC;;3;4\nD;1;east;4\nE;1;2;-3\nF;1.5;2;3\n")
     assert found["faults"] == [
-        "line 3: `latitude (lat)` is 95: it has to be from -90 to 90",
+        "line 3: `latitude (lat)` is 95: it has to be from \u221290 to 90",
         "line 4: `latitude` is empty",
         "line 5: `longitude (lon)` is no number: east",
         "line 6: `need 1 (need)` is -3: it has to be at least 0",

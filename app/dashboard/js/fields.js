@@ -54,7 +54,7 @@ export function labelled(title, input, { pointer, hint } = {}) {
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }
 
-function makeField(name, schema, { pointer, value, title = t(titleOf(name)), onchange }) {
+function makeField(name, schema, { pointer, value, title = labelOf(name), onchange }) {
   const given = value ?? schema.default;
   const input = inputFor(schema, given);
   input.name = name;
@@ -72,6 +72,16 @@ function forPeople(description) {
 export function titleOf(name) {
   const text = name.replace(/_s$/, ", s").replaceAll("_", " ");
   return text[0].toUpperCase() + text.slice(1);
+}
+
+/** The same in the language of the page. */
+export function labelOf(name) {
+  return t(titleOf(name));
+}
+
+/** A label as it stands in a line. */
+export function inLine(label) {
+  return label[0].toLowerCase() + label.slice(1);
 }
 
 function inputFor(schema, given) {

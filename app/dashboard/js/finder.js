@@ -4,6 +4,7 @@ import { h } from "./dom.js";
 import { called, placeNames, sum } from "./plan.js";
 import { requestedBy } from "./problem.js";
 import { placeOf } from "./stops.js";
+import { t } from "./texts.js";
 import { allTimes } from "./times.js";
 
 /** With fewer UAVs and areas than this all is seen at once. */
@@ -17,8 +18,8 @@ export class Finder {
     let later = null;
     const soon = () => { clearTimeout(later); later = setTimeout(changed, REST_MS); };
     this.text = h("input", { type: "search", name: "find", autocomplete: "off", oninput: soon });
-    this.order = h("select", { name: "order", onchange: changed }, h("option", { value: "" }, "as in the problem"), h("option", { value: "late" }, "latest and most lacking first"));
-    this.element = h("div", { class: "grid2", id: "finder" }, h("label", {}, "Find a UAV or an area", this.text), h("label", {}, "Order", this.order));
+    this.order = h("select", { name: "order", onchange: changed }, h("option", { value: "" }, t("as in the problem")), h("option", { value: "late" }, t("latest and most lacking first")));
+    this.element = h("div", { class: "grid2", id: "finder" }, h("label", {}, t("Find a UAV or an area"), this.text), h("label", {}, t("Order"), this.order));
   }
 
   /** Show the fields where a problem is long. */

@@ -7,27 +7,29 @@ import { choices, degreesLikely, guess, itemsOf, kindOf, rightRow } from "./form
 import { BASES } from "./kinds.js";
 import { materials, newItem } from "./problem.js";
 import { get } from "./state.js";
+import { plainNumber, t, writtenNumber } from "./texts.js";
 
 const SHOWN_ROWS = 5;
 const SHOWN_FAULTS = 5;
 /** Kinds of material that a list may have columns of. */
 const MOST_AMOUNTS = 12;
-const KINDS = { targets: "Areas", uavs: "UAVs", [BASES]: "Bases" };
-const POSITIONS = { wgs84: "longitude and latitude, in degrees", local: "x and y, on a plane" };
+const KINDS = { targets: t("Areas"), uavs: t("UAVs"), [BASES]: t("Bases") };
+const POSITIONS = { wgs84: t("longitude and latitude, in degrees"), local: t("x and y, on a plane") };
 const WAYS = {
-  add: () => "Add them to what is there",
-  replace: (kind) => ({ targets: "Put them in the place of the areas that are there", uavs: "Put them in the place of the UAVs that are there", [BASES]: "Put them in the place of the bases that are there" })[kind],
-  new: () => "Begin a new problem with them",
+  add: () => t("Add them to what is there"),
+  replace: (kind) => ({ targets: t("Put them in the place of the areas that are there"), uavs: t("Put them in the place of the UAVs that are there"), [BASES]: t("Put them in the place of the bases that are there") })[kind],
+  new: () => t("Begin a new problem with them"),
 };
 const FOUND = {
-  targets: (count, all) => `${count} areas of ${all} rows can be read.`,
-  uavs: (count, all) => `${count} UAVs of ${all} rows can be read.`,
-  [BASES]: (count, all) => `${count} bases of ${all} rows can be read.`,
+  targets: (areas, rows) => t("{areas} areas of {rows} rows can be read.", { areas, rows }),
+  uavs: (uavs, rows) => t("{uavs} UAVs of {rows} rows can be read.", { uavs, rows }),
+  [BASES]: (bases, rows) => t("{bases} bases of {rows} rows can be read.", { bases, rows }),
 };
+/** Columns by names that the import knows in this language too. */
 const TEMPLATES = {
-  targets: [["name", "latitude", "longitude", "need", "urgency", "deadline"], ["Dondo", -19.61, 34.74, 20, 2, ""], ["Buzi", -19.88, 34.6, 12, 1, 3]],
-  uavs: [["name", "latitude", "longitude", "speed", "range", "load"], ["Wing 1", -19.8, 34.9, 100, 150, 2], ["Copter 1", -19.8, 34.9, 50, 15, 5]],
-  [BASES]: [["name", "latitude", "longitude", "stock"], ["Port", -19.83, 34.84, 500]],
+  targets: [[t("name"), t("latitude"), t("longitude"), t("need"), t("urgency"), t("deadline")], ["Dondo", -19.61, 34.74, 20, 2, ""], ["Buzi", -19.88, 34.6, 12, 1, 3]],
+  uavs: [[t("name"), t("latitude"), t("longitude"), t("speed"), t("range"), t("load")], ["Wing 1", -19.8, 34.9, 100, 150, 2], ["Copter 1", -19.8, 34.9, 50, 15, 5]],
+  [BASES]: [[t("name"), t("latitude"), t("longitude"), t("stock")], ["Port", -19.83, 34.84, 500]],
 };
 
 /** A table with the columns that a list may have, and rows to be written over. @param {"uavs"|"targets"|"bases"} kind */
@@ -63,19 +65,19 @@ class ImportDialog {
     this.positions.disabled = sheet.globe;
     this.ways = choice([], "", () => this.#redraw(), { name: "how" });
     this.way = past.length && fits ? "add" : "new";
-    this.table = h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "The first rows" });
+    this.table = h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": t("The first rows") });
     this.others = h("div", { class: "grid2" });
     this.found = h("p", { role: "status" });
     this.faults = h("div", { role: "alert" });
     this.lax = h("input", { type: "checkbox", onchange: () => this.#judge() });
-    this.laxly = h("label", { class: "row", hidden: true }, this.lax, "Leave out the rows that cannot be read");
-    this.take = h("button", { class: "primary", value: "take" }, "Import");
-    const form = h("form", { method: "dialog" }, h("h2", { id: "import-heading" }, `Import ${name}`),
+    this.laxly = h("label", { class: "row", hidden: true }, this.lax, t("Leave out the rows that cannot be read"));
+    this.take = h("button", { class: "primary", value: "take" }, t("Import"));
+    const form = h("form", { method: "dialog" }, h("h2", { id: "import-heading" }, t("Import {file}", { file: name })),
       sheet.notices.map((notice) => h("p", { class: "hint" }, `${notice}.`)),
-      h("div", { class: "grid2" }, labelled("These are", this.kinds), labelled("Positions", this.positions)),
-      h("p", { class: "hint" }, "Above each column: what it is. Columns that are left out are not read."),
-      this.table, this.others, labelled("What to do with them", this.ways), this.found, this.faults, this.laxly,
-      h("p", { class: "actions" }, h("button", { type: "button", class: "quiet", onclick: () => this.element.close() }, "Cancel"), this.take));
+      h("div", { class: "grid2" }, labelled(t("These are"), this.kinds), labelled(t("Positions"), this.positions)),
+      h("p", { class: "hint" }, t("Above each column: what it is. Columns that are left out are not read.")),
+      this.table, this.others, labelled(t("What to do with them"), this.ways), this.found, this.faults, this.laxly,
+      h("p", { class: "actions" }, h("button", { type: "button", class: "quiet", onclick: () => this.element.close() }, t("Cancel")), this.take));
     this.element = h("dialog", { id: "import-dialog", "aria-labelledby": "import-heading" }, form);
     this.element.addEventListener("close", () => this.#end());
     this.#begin();
@@ -113,8 +115,8 @@ class ImportDialog {
   #drawTable() {
     const { columns, rows } = this.sheet;
     const pick = (column, at) => {
-      const select = h("select", { dataset: { column: String(at) }, "aria-label": column ? `What the column ${column} is` : `What column ${at + 1} is`, onchange: () => this.#assign(at, select.value || null) },
-        h("option", { value: "" }, "left out"), this.known.map(({ name, title }) => h("option", { value: name, selected: name === this.assigned[at] }, title)));
+      const select = h("select", { dataset: { column: String(at) }, "aria-label": column ? t("What the column {column} is", { column }) : t("What column {number} is", { number: at + 1 }), onchange: () => this.#assign(at, select.value || null) },
+        h("option", { value: "" }, t("left out")), this.known.map(({ name, title }) => h("option", { value: name, selected: name === this.assigned[at] }, title)));
       return select;
     };
     this.table.replaceChildren(h("table", {},
@@ -138,19 +140,22 @@ class ImportDialog {
     };
     const free = this.known.filter(({ name, needed }) => needed && !this.assigned.includes(name) && valueOf(name) !== undefined);
     this.others.replaceChildren(...free.map(({ name, title }) => {
-      const input = h("input", { name, value: String(valueOf(name)), inputmode: "decimal", autocomplete: "off", oninput: () => { this.typed[name] = input.value; this.#judge(); } });
-      return labelled(`${title}, of all`, input);
+      const input = h("input", { name, value: writtenNumber(valueOf(name)), inputmode: "decimal", autocomplete: "off", oninput: () => { this.typed[name] = input.value; this.#judge(); } });
+      return labelled(t("{field}, of all", { field: title }), input);
     }));
   }
 
   #judge() {
     const otherwise = {};
-    for (const { name, value } of this.others.querySelectorAll("input")) if (value.trim() && Number.isFinite(Number(value))) otherwise[name] = Number(value);
+    for (const { name, value } of this.others.querySelectorAll("input")) {
+      const number = plainNumber(value.trim());
+      if (number && Number.isFinite(Number(number))) otherwise[name] = Number(number);
+    }
     const { items, faults } = itemsOf(this.sheet, this.assigned, this.known, otherwise);
     this.items = items;
     this.found.textContent = FOUND[this.kind](items.length, this.sheet.rows.length);
     const more = faults.length - SHOWN_FAULTS;
-    this.faults.replaceChildren(...(faults.length ? [h("ul", { class: "violations" }, faults.slice(0, SHOWN_FAULTS).map((fault) => h("li", { class: "error" }, fault)), more > 0 && h("li", { class: "error" }, `and ${more} more`)), h("p", { class: "hint" }, `A row of these columns is right like this: ${rightRow(this.sheet, this.assigned)}`)] : []));
+    this.faults.replaceChildren(...(faults.length ? [h("ul", { class: "violations" }, faults.slice(0, SHOWN_FAULTS).map((fault) => h("li", { class: "error" }, fault)), more > 0 && h("li", { class: "error" }, t("and {count} more", { count: more }))), h("p", { class: "hint" }, t("A row of these columns is right like this: {row}", { row: rightRow(this.sheet, this.assigned) }))] : []));
     this.laxly.hidden = !faults.length || !items.length;
     this.take.disabled = !items.length || (faults.length > 0 && !this.lax.checked);
   }

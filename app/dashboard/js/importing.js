@@ -1,6 +1,6 @@
 /** The items of a list, brought into a problem. */
 
-import { CALLED, distinct } from "./formats.js";
+import { distinct } from "./formats.js";
 import { STEMS } from "./kinds.js";
 import { materials, named, withMaterials } from "./problem.js";
 import { withAdded, withRemoved } from "./references.js";
@@ -24,7 +24,7 @@ export function withItems(problem, fields, kind, items, { how, crs }) {
   const count = start.uavs.length || start.targets.length ? Math.max(materials(start), asked) : asked;
   const before = withMaterials({ ...start, [kind]: start[kind] ?? [] }, fields, count);
   const fitted = items.map((item) => (item[carried] ? { ...item, [carried]: Array.from({ length: count }, (_, k) => item[carried][k] ?? 0) } : item));
-  const all = named(distinct([...before[kind], ...fitted], CALLED[kind], itemFields(fields, kind).id.maxLength, notices), STEMS[kind]);
+  const all = named(distinct([...before[kind], ...fitted], kind, itemFields(fields, kind).id.maxLength, notices), STEMS[kind]);
   const changed = all.slice(before[kind].length).reduce((now, item) => withAdded(now, kind, item), before);
   return { problem: changed, notices };
 }

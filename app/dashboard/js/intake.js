@@ -7,23 +7,24 @@ import { askForColumns } from "./import_dialog.js";
 import { withItems } from "./importing.js";
 import { edit, open } from "./problem.js";
 import { get, set } from "./state.js";
+import { t, tn } from "./texts.js";
 
-export const NOT_SAID = "The service has not said yet which fields a problem has";
+export const NOT_SAID = t("The service has not said yet which fields a problem has");
 const TOLD = {
-  targets: (count, name) => `${count} areas of ${name} are here`,
-  uavs: (count, name) => `${count} UAVs of ${name} are here`,
-  bases: (count, name) => `${count} bases of ${name} are here`,
+  targets: (count, file) => tn(count, "{count} area of {file} is here", "{count} areas of {file} are here", { file }),
+  uavs: (count, file) => tn(count, "{count} UAV of {file} is here", "{count} UAVs of {file} are here", { file }),
+  bases: (count, file) => tn(count, "{count} base of {file} is here", "{count} bases of {file} are here", { file }),
 };
 
 /** Open a problem, and say how what was there comes back. */
-export function bring(problem, name, told = `${name} is open`) {
+export function bring(problem, name, told = t("{problem} is open", { problem: name })) {
   sayWithUndo(told, () => open(problem, name));
 }
 
 function sayWithUndo(told, act) {
   const { past } = get();
   act();
-  notify(told, "info", get().past === past ? null : { title: "Undo", act: undo });
+  notify(told, "info", get().past === past ? null : { title: t("Undo"), act: undo });
 }
 
 /** Do something, and say what went wrong with it. */
@@ -48,7 +49,7 @@ export async function takeIn(bytes, name) {
     if (sheet) return takeList(sheet, name);
     const found = read(bytes, problem, fields);
     set({ view: "problem" });
-    bring(found.problem, withoutEnding(name), [`${name} is open`, ...found.notices].join(". "));
+    bring(found.problem, withoutEnding(name), [t("{problem} is open", { problem: name }), ...found.notices].join(". "));
   }, `${name}: `);
 }
 
@@ -76,7 +77,7 @@ function withoutEnding(name) {
 
 /** Files that are dropped anywhere on the page, and tables that are pasted outside of a field, are taken in. */
 export function watchIntake() {
-  const field = h("div", { class: "drop-here", hidden: true }, h("p", {}, "Drop a file: a problem, or a list of places"));
+  const field = h("div", { class: "drop-here", hidden: true }, h("p", {}, t("Drop a file: a problem, or a list of places")));
   document.body.append(field);
   const hasFile = (event) => event.dataTransfer?.types.includes("Files") && !document.querySelector("dialog[open]");
   document.addEventListener("dragover", (event) => {
@@ -90,7 +91,7 @@ export function watchIntake() {
     if (!hasFile(event)) return;
     event.preventDefault();
     const [file, ...more] = event.dataTransfer.files;
-    if (more.length) notify(`One file is taken at a time: ${file.name}`);
+    if (more.length) notify(t("One file is taken at a time: {file}", { file: file.name }));
     if (file) void takeFile(file);
   });
   document.addEventListener("paste", (event) => {
@@ -100,6 +101,6 @@ export function watchIntake() {
     if (!file && !isTable(text)) return;
     event.preventDefault();
     if (file && !text) return void takeFile(file);
-    void takeIn(new TextEncoder().encode(text), "what was pasted");
+    void takeIn(new TextEncoder().encode(text), t("what was pasted"));
   });
 }

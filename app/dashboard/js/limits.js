@@ -1,5 +1,7 @@
 /** Limits of numbers, as the service's description has them, and those of the globe. */
 
+import { t } from "./texts.js";
+
 const PLACES = ["x", "y", "x_s", "y_s", "x_c", "y_c"];
 /** Degrees from the middle, by the letter that names of fields begin with. */
 export const DEGREES = { x: 180, y: 90 };
@@ -18,7 +20,7 @@ const NO_LIMIT = 1e9;
 export function beyond(value, { minimum = -Infinity, maximum = Infinity, exclusiveMinimum = -Infinity }) {
   if (value >= minimum && value <= maximum && value > exclusiveMinimum) return null;
   const positive = minimum > 0 && minimum <= TINY;
-  if (positive || exclusiveMinimum > -Infinity) return `it has to be more than ${positive ? 0 : exclusiveMinimum}`;
-  if (minimum > -NO_LIMIT && maximum < NO_LIMIT) return `it has to be from ${minimum} to ${maximum}`;
-  return value < minimum ? `it has to be at least ${minimum}` : `it has to be at most ${maximum}`;
+  if (positive || exclusiveMinimum > -Infinity) return t("it has to be more than {limit}", { limit: positive ? 0 : exclusiveMinimum });
+  if (minimum > -NO_LIMIT && maximum < NO_LIMIT) return t("it has to be from {low} to {high}", { low: minimum, high: maximum });
+  return value < minimum ? t("it has to be at least {limit}", { limit: minimum }) : t("it has to be at most {limit}", { limit: maximum });
 }

@@ -3,6 +3,7 @@
 import * as L from "../vendor/leaflet/leaflet.js";
 import { json } from "./api.js";
 import { h, notify } from "./dom.js";
+import { t } from "./texts.js";
 
 /** Names are shown while no more points than this are in sight. */
 const MOST_NAMES = 40;
@@ -23,7 +24,7 @@ export const Overlay = L.Layer.extend({
     read ??= json(this._path);
     read.then((collection) => this._map && this._show(collection)).catch((error) => {
       read = null;
-      notify(`The overlay of the map could not be read: ${error.message}`, "error");
+      notify(t("The overlay of the map could not be read: {why}", { why: error.message }), "error");
     });
   },
 

@@ -1,13 +1,12 @@
 /** Remedies for unmet needs: what each would take, in words, and as a change of the problem or of the plan. */
 
-import { shown } from "./dom.js";
 import { beginDraft, changeDraft } from "./drafting.js";
 import { withVisit } from "./draft.js";
 import { amountsText } from "./materials.js";
 import { names } from "./plan.js";
 import { edit } from "./problem.js";
-import { filledText } from "./sentences.js";
 import { get } from "./state.js";
+import { betweenAmounts, shown, t, tn } from "./texts.js";
 import { durationText, lengthText } from "./units.js";
 
 /** What would help, in words; null where nothing simple would. @param {object} unmet as the answer has it */
@@ -15,21 +14,22 @@ export function remedyText(problem, unmet) {
   const { relaxation, uav_id: uavId } = unmet;
   if (typeof unmet.remedy !== "string") return null;
   const uav = names(problem.uavs)(uavId);
-  if (!relaxation) return filledText("one more visit by {uav}", { uav });
+  if (!relaxation) return t("one more visit by {uav}", { uav });
   const area = names(problem.targets);
   const { more_load: load = [], more_range: range = 0, more_steps: steps = 0, later_deadlines: later = [] } = relaxation;
   return [
-    load.some((amount) => amount > 0) && filledText("{amounts} more aboard {uav}", { amounts: amountsText(problem, load), uav }),
-    range > 0 && filledText("{length} more range of {uav}", { length: lengthText(problem, range), uav }),
-    ...later.map(({ target_id: id, by }) => filledText("a deadline {time} later for {area}", { time: durationText(problem, by), area: area(id) })),
-    steps > 0 && "one more decision step",
-  ].filter(Boolean).join(", ");
+    load.some((amount) => amount > 0) && t("{amounts} more aboard {uav}", { amounts: amountsText(problem, load), uav }),
+    range > 0 && t("{length} more range of {uav}", { length: lengthText(problem, range), uav }),
+    ...later.map(({ target_id: id, by }) => t("a deadline {time} later for {area}", { time: durationText(problem, by), area: area(id) })),
+    steps > 0 && tn(steps, "one more decision step", "{count} more decision steps"),
+  ].filter(Boolean).join(betweenAmounts());
 }
 
 /** What the reward gains or loses by it, in words; null where nobody has reckoned it. */
 export function changeText({ reward_change: change }) {
   if (typeof change !== "number") return null;
-  return filledText(change < 0 ? "reward {change}: it costs more than it earns" : "reward +{change}", { change: shown(change, 3) });
+  const said = { change: shown(change, 3) };
+  return change < 0 ? t("reward {change}: it costs more than it earns", said) : t("reward +{change}", said);
 }
 
 /** A problem in which a remedy is allowed. */

@@ -5,8 +5,8 @@ import { paint } from "./colours.js";
 import { h, svg } from "./dom.js";
 import { lockedCount } from "./locks.js";
 import { called, placeNames, routesOf, sum } from "./plan.js";
-import { filledText } from "./sentences.js";
 import { get, select } from "./state.js";
+import { t } from "./texts.js";
 
 /** With more stops than this only the selected route has numbers and arrows, and the lines are thinner. */
 const FEW_STOPS = 80;
@@ -54,7 +54,7 @@ export class Routes {
     this.few = stops <= FEW_STOPS;
     const nameOf = routes.length ? placeNames(problem) : null;
     for (const { uav, flights, stops: visits } of routes) {
-      const says = () => h("span", {}, filledText("{uav}: {places}", { uav: called(uav), places: visits.map(({ place }) => nameOf(place)).join(" → ") }));
+      const says = () => h("span", {}, t("{uav}: {places}", { uav: called(uav), places: visits.map(({ place }) => nameOf(place)).join(" → ") }));
       for (const { number, points } of flights) {
         const line = L.polyline(points.map(latLng), { renderer: this.renderer, className: `route${number > 1 ? " later-flight" : ""}`, weight: this.few ? 2.5 : 1.75, smoothFactor: 0.5 });
         line.on("click", (event) => { L.DomEvent.stop(event); select({ kind: "uavs", id: uav.id }); });

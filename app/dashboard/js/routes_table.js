@@ -6,19 +6,11 @@ import { lockedCount, lockFirst } from "./locks.js";
 import { amountsCell, amountsHead } from "./materials.js";
 import { called, placeNames, waiting } from "./plan.js";
 import { Portions } from "./portions.js";
-import { counted, filled, filledText } from "./sentences.js";
 import { get, select } from "./state.js";
 import { atBase, flightsOf, isReload, placeOf } from "./stops.js";
+import { listed, t, tn, tNodes } from "./texts.js";
 import { durationText, length, moment } from "./units.js";
 
-const LOCKED_TOO = {
-  one: "{areas} is locked too: what is locked comes first, in order.",
-  other: "{areas} are locked too: what is locked comes first, in order.",
-};
-const UNLOCKED_TOO = {
-  one: "{areas} is unlocked too: what is locked comes first.",
-  other: "{areas} are unlocked too: what is locked comes first.",
-};
 const COLUMNS = "5";
 const SHACKLE = { open: "M8 11V7a4 4 0 0 1 7.5-2", shut: "M8 11V7a4 4 0 0 1 8 0v4" };
 
@@ -30,9 +22,9 @@ const SHACKLE = { open: "M8 11V7a4 4 0 0 1 7.5-2", shut: "M8 11V7a4 4 0 0 1 8 0v
  * @returns {{element: HTMLElement, portions: Portions | null, markLocks: () => void}}
  */
 export function routesTable(problem, answer, wanted, tell) {
-  const head = ["#", problem.bases?.length ? "Where" : "Area", "Arrives", amountsHead(problem, "Unloads")];
+  const head = ["#", problem.bases?.length ? t("Where") : t("Area"), t("Arrives"), amountsHead(problem, t("Unloads"))];
   const flying = answer.routes.filter((route) => route.stops.length).length;
-  if (!flying) return { element: h("p", { class: "card", id: "nobody-flies" }, "Nobody flies: no visit is possible, or none is worth its distance."), portions: null, markLocks: () => {} };
+  if (!flying) return { element: h("p", { class: "card", id: "nobody-flies" }, t("Nobody flies: no visit is possible, or none is worth its distance.")), portions: null, markLocks: () => {} };
   const body = h("tbody", {});
   const uavs = new Map(problem.uavs.map((uav) => [uav.id, uav]));
   const nameOf = placeNames(problem);
@@ -43,7 +35,7 @@ export function routesTable(problem, answer, wanted, tell) {
       const { uavId, at } = button.dataset;
       const locked = Number(at) < lockedCount(now.get(uavId), visits.get(uavId));
       button.setAttribute("aria-pressed", String(locked));
-      button.title = locked ? "Unlock this visit" : "Lock this visit: the next allocation keeps it";
+      button.title = locked ? t("Unlock this visit") : t("Lock this visit: the next allocation keeps it");
       button.disabled = !now.has(uavId);
       button.querySelector("path").setAttribute("d", SHACKLE[locked ? "shut" : "open"]);
       button.closest("tr").classList.toggle("locked", locked);
@@ -52,8 +44,9 @@ export function routesTable(problem, answer, wanted, tell) {
   const portions = new Portions(body, wanted, (route) => routeRows(problem, uavs.get(route.uav_id), route, nameOf, tell), (button) => h("tr", {}, h("td", { colspan: COLUMNS }, button)));
   new MutationObserver(markLocks).observe(body, { childList: true });
   markLocks();
-  const element = h("details", { open: true }, h("summary", {}, filledText(wanted.length < flying ? "Routes of {flying} of {uavs} UAVs, {shown} shown" : "Routes of {flying} of {uavs} UAVs", { flying, shown: wanted.length, uavs: problem.uavs.length })),
-    h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Routes" }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [0, 2, 3].includes(at) ? "num" : null }, title)), h("td", {}))), body)));
+  const counts = { flying, uavs: problem.uavs.length };
+  const element = h("details", { open: true }, h("summary", {}, wanted.length < flying ? t("Routes of {flying} of {uavs} UAVs, {shown} shown", { ...counts, shown: wanted.length }) : t("Routes of {flying} of {uavs} UAVs", counts)),
+    h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": t("Routes") }, h("table", { id: "routes" }, h("thead", {}, h("tr", {}, head.map((title, at) => h("th", { scope: "col", class: [0, 2, 3].includes(at) ? "num" : null }, title)), h("td", {}))), body)));
   return { element, portions, markLocks };
 }
 
@@ -76,30 +69,38 @@ function headRow(problem, uav, route, nameOf, flights) {
   const key = paint(h("span", { class: "key", "aria-hidden": "true" }), route.uav_id);
   return h("tr", { class: "head" }, h("th", { scope: "rowgroup", colspan: COLUMNS },
     h("button", { type: "button", class: "quiet", title: route.uav_id, onclick: () => select({ kind: "uavs", id: route.uav_id }) }, key, called(uav)),
-    h("span", { class: "hint" }, wayOf(problem, route, nameOf)), flights && h("span", { class: "hint" }, filledText("{count} flights", { count: flights }))));
+    h("span", { class: "hint" }, wayOf(problem, route, nameOf)), flights && h("span", { class: "hint" }, tn(flights, "{count} flight", "{count} flights"))));
 }
 
 /** A stop at a base, which ends a flight. What comes after it cannot be locked: commitments come before all reloads. */
 function reloadRow(problem, route, stop, n, nameOf) {
   return h("tr", { class: "reload", dataset: { uavId: route.uav_id, baseId: stop.base_id, step: stop.step } },
     h("td", { class: "num" }, String(n + 1)), h("td", { class: "area", title: stop.base_id }, nameOf(placeOf(stop))),
-    h("td", { class: "num" }, moment(problem, stop.arrival_time), h("p", { class: "hint" }, filled("flies on from {time}", { time: moment(problem, stop.departure_time) }))),
-    h("td", { class: "num" }, filled("loads {amounts}", { amounts: h("span", {}, amountsCell(problem, stop.loaded)) })), h("td", {}));
+    h("td", { class: "num" }, moment(problem, stop.arrival_time), h("p", { class: "hint" }, tNodes("flies on from {time}", { time: moment(problem, stop.departure_time) }))),
+    h("td", { class: "num" }, tNodes("loads {amounts}", { amounts: h("span", {}, amountsCell(problem, stop.loaded)) })), h("td", {}));
 }
 
 /** How long a route is, and where it ends. */
 function wayOf(problem, route, nameOf) {
   const ways = { out: length(problem, route.distance, 3), home: length(problem, route.return_distance, 3) };
-  if (!route.landing?.base_id) return filled("{out} + {home} home", ways);
-  return filled("{out} + {home} to {base}", { ...ways, base: nameOf(atBase(route.landing.base_id)) });
+  if (!route.landing?.base_id) return tNodes("{out} + {home} home", ways);
+  return tNodes("{out} + {home} to {base}", { ...ways, base: nameOf(atBase(route.landing.base_id)) });
 }
 
 /** What stands beside an arrival where the visit begins later. */
 function waitHint(problem, uav, stops, n) {
   const { time, onGround } = waiting(uav, stops, n);
   if (!(time > 0)) return null;
-  const sentence = onGround ? "waits {duration} on the ground, begins {begin}" : "waits {duration}, begins {begin}";
-  return h("p", { class: "hint" }, filled(sentence, { duration: durationText(problem, time), begin: moment(problem, stops[n].begin_time) }));
+  const facts = { duration: durationText(problem, time), begin: moment(problem, stops[n].begin_time) };
+  return h("p", { class: "hint" }, onGround ? tNodes("waits {duration} on the ground, begins {begin}", facts) : tNodes("waits {duration}, begins {begin}", facts));
+}
+
+function lockedToo(areas) {
+  return tn(areas.length, "{areas} is locked too: what is locked comes first, in order.", "{areas} are locked too: what is locked comes first, in order.", { areas: listed(areas) });
+}
+
+function unlockedToo(areas) {
+  return tn(areas.length, "{areas} is unlocked too: what is locked comes first.", "{areas} are unlocked too: what is locked comes first.", { areas: listed(areas) });
 }
 
 function lockButton(uav, route, n, nameOf, tell) {
@@ -110,9 +111,10 @@ function lockButton(uav, route, n, nameOf, tell) {
     const lock = n >= count;
     const others = (lock ? visits.slice(count, n) : visits.slice(n + 1, count)).map(nameOf);
     lockFirst(uav.id, visits, lock ? n + 1 : n);
-    const too = others.length ? ` ${filledText(counted(others.length, lock ? LOCKED_TOO : UNLOCKED_TOO), { areas: others.join(", ") })}` : "";
-    tell(filledText(lock ? "{uav} visits {area} in the next plan too." : "The next plan of {uav} need not visit {area}.", { uav: called(uav), area: name }) + too);
+    const facts = { uav: called(uav), area: name };
+    const says = lock ? t("{uav} visits {area} in the next plan too.", facts) : t("The next plan of {uav} need not visit {area}.", facts);
+    tell([says, ...(others.length ? [lock ? lockedToo(others) : unlockedToo(others)] : [])].join(" "));
   };
-  return h("button", { type: "button", class: "quiet lock", "aria-label": `Lock visit ${n + 1} of ${called(uav)}, ${name}`, dataset: { uavId: uav.id, at: n }, onclick: act },
+  return h("button", { type: "button", class: "quiet lock", "aria-label": t("Lock visit {number} of {uav}, {area}", { number: n + 1, uav: called(uav), area: name }), dataset: { uavId: uav.id, at: n }, onclick: act },
     svg("svg", { viewBox: "0 0 24 24", width: 16, height: 16, "aria-hidden": "true" }, svg("rect", { x: 5, y: 11, width: 14, height: 9, rx: 2 }), svg("path", { d: SHACKLE.open })));
 }

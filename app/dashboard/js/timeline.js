@@ -5,9 +5,9 @@ import { h } from "./dom.js";
 import { amountsText } from "./materials.js";
 import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
-import { filledText } from "./sentences.js";
 import { select } from "./state.js";
 import { baseOf } from "./stops.js";
+import { t } from "./texts.js";
 import { allTimes } from "./times.js";
 import { momentText, roundMoments } from "./units.js";
 
@@ -39,20 +39,20 @@ export function timeline(problem, answer, routes = answer.routes) {
       const place = nameOf(stop.id);
       const { waits } = stop;
       if (waits) {
-        const sentence = waits.onGround ? "waits for {place} on the ground until {time}" : "waits for {place} in the air until {time}";
-        track.append(bar("wait", waits.from, waits.to, filledText(sentence, { place, time: at(waits.to) })));
+        const facts = { place, time: at(waits.to) };
+        track.append(bar("wait", waits.from, waits.to, waits.onGround ? t("waits for {place} on the ground until {time}", facts) : t("waits for {place} in the air until {time}", facts)));
       }
-      const leg = stops.some(({ loaded }) => loaded) ? "flight {flight}, to {place}" : "to {place}";
-      track.append(bar("leg", stop.left, stop.arrival, filledText(leg, { flight: stop.flight, place })));
+      const leg = stops.some(({ loaded }) => loaded) ? t("flight {flight}, to {place}", { flight: stop.flight, place }) : t("to {place}", { place });
+      track.append(bar("leg", stop.left, stop.arrival, leg));
       const facts = { number: n + 1, place, begin: at(stop.begin), end: at(stop.done), amounts: amountsText(problem, stop.loaded ?? stop.delivered) };
       const made = stop.loaded
-        ? bar("turnaround", stop.begin, stop.done, filledText("{number}. {place} at {begin}: loads {amounts}, takes off from {end}", facts))
-        : bar("visit", stop.begin, stop.done, filledText("{number}. {place} at {begin}: {amounts}", facts));
+        ? bar("turnaround", stop.begin, stop.done, t("{number}. {place} at {begin}: loads {amounts}, takes off from {end}", facts))
+        : bar("visit", stop.begin, stop.done, t("{number}. {place} at {begin}: {amounts}", facts));
       if (stop.loaded) made.dataset.baseId = baseOf(stop.id);
       else made.dataset.targetId = stop.id;
       track.append(made);
     });
-    if (home > stops.at(-1).done) track.append(bar("leg home", stops.at(-1).done, home, filledText("home at {time}", { time: at(home) })));
+    if (home > stops.at(-1).done) track.append(bar("leg home", stops.at(-1).done, home, t("home at {time}", { time: at(home) })));
     return h("li", { dataset: { uavId: uav.id } }, h("button", { type: "button", class: "quiet", title: uav.id, onclick: () => select({ kind: "uavs", id: uav.id }) }, called(uav)), track);
   };
   const ticks = h("li", { class: "ticks", "aria-hidden": "true" }, h("span", {}), h("div", { class: "track" }, roundMoments(problem, end).map((time) => {
@@ -61,6 +61,6 @@ export function timeline(problem, answer, routes = answer.routes) {
     return tick;
   })));
   if (!flying.length) return { element: null, portions: null };
-  const element = h("ol", { class: "timeline", "aria-label": "Timeline of each UAV" }, ticks);
+  const element = h("ol", { class: "timeline", "aria-label": t("Timeline of each UAV") }, ticks);
   return { element, portions: new Portions(element, rows, row, (button) => h("li", {}, button)) };
 }

@@ -1,8 +1,8 @@
 /** Times, durations and lengths of a problem for people: hours and kilometres on the globe, plain numbers on a plane. */
 
-import { h, shown } from "./dom.js";
-import { filledText } from "./sentences.js";
+import { h } from "./dom.js";
 import { get } from "./state.js";
+import { shown, t } from "./texts.js";
 
 const HOUR_MS = 3_600_000;
 const MINUTES = [1, 2, 5, 10, 15, 30, 60, 120, 180, 360, 720, 1440, 2880, 10080];
@@ -42,7 +42,7 @@ function ofTheDay(from, time) {
   const midnight = (date) => Date.UTC(date.getFullYear(), date.getMonth(), date.getDate());
   const days = Math.round((midnight(at) - midnight(new Date(from))) / (24 * HOUR_MS));
   const clock = `${String(at.getHours()).padStart(2, "0")}:${String(at.getMinutes()).padStart(2, "0")}`;
-  return days ? filledText("{clock} +{days} d", { clock, days }) : clock;
+  return days ? t("{clock} +{days} d", { clock, days }) : clock;
 }
 
 /** A moment of a plan as a text: of the day where it is known when the plan begins, since its begin otherwise. @param {number | null | undefined} time */
@@ -55,18 +55,18 @@ export function momentText(problem, time) {
 /** The same as an element, with the exact number in it. */
 export function moment(problem, time) {
   if (!Number.isFinite(time)) return h("data", {}, "–");
-  const says = onGlobe(problem) ? filledText("{since} h after the begin", { since: since(problem, time).replace("+", "") }) : String(time);
+  const says = onGlobe(problem) ? t("{since} h after the begin", { since: since(problem, time).replace("+", "") }) : String(time);
   return h("data", { value: String(time), title: says }, momentText(problem, time));
 }
 
 /** How long something takes. */
 export function durationText(problem, time) {
-  return onGlobe(problem) ? filledText("{time} h", { time: hoursAndMinutes(time) }) : shown(time);
+  return onGlobe(problem) ? t("{time} h", { time: hoursAndMinutes(time) }) : shown(time);
 }
 
 /** A length as a text. */
 export function lengthText(problem, length, digits = 4) {
-  return onGlobe(problem) ? filledText("{length} km", { length: shown(length, digits) }) : shown(length, digits);
+  return onGlobe(problem) ? t("{length} km", { length: shown(length, digits) }) : shown(length, digits);
 }
 
 /** The same as an element, with the exact number in it. */
@@ -76,7 +76,7 @@ export function length(problem, value, digits = 4) {
 
 /** A speed as a text. */
 export function speedText(problem, speed) {
-  return onGlobe(problem) ? filledText("{speed} km/h", { speed: shown(speed) }) : shown(speed);
+  return onGlobe(problem) ? t("{speed} km/h", { speed: shown(speed) }) : shown(speed);
 }
 
 /** Round moments from 0 to an end, at most nine of them: of the day where it is known when the plan begins. @returns {number[]} */

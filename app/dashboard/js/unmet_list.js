@@ -7,10 +7,8 @@ import { names } from "./plan.js";
 import { Portions } from "./portions.js";
 import { requestedBy } from "./problem.js";
 import { addVisit, allow, changeText, remedyText } from "./remedies.js";
-import { counted, filled, filledText } from "./sentences.js";
 import { get, select, set, subscribe } from "./state.js";
-
-const TITLES = { one: "1 of {areas} areas lacks something", other: "{count} of {areas} areas lack something" };
+import { t, tn, tNodes } from "./texts.js";
 
 /** The problem on screen as it was before a remedy was allowed in it, by the entry: until then it can be allowed. */
 const allowed = new WeakMap();
@@ -27,13 +25,13 @@ export function unmetList(problem, plan, wanted, changing) {
     return h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
       h("div", { class: "row spread" },
         h("button", { type: "button", class: "quiet", title: unmet.target_id, onclick: () => select({ kind: "targets", id: unmet.target_id }) }, nameOf(unmet.target_id)),
-        h("span", { class: "lacks" }, filled("lacks {amounts} of {asked}", { amounts: h("strong", {}, amountsCell(problem, unmet.remaining)), asked: amountsText(problem, lacking) }))),
+        h("span", { class: "lacks" }, tNodes("lacks {amounts} of {asked}", { amounts: h("strong", {}, amountsCell(problem, unmet.remaining)), asked: amountsText(problem, lacking) }))),
       h("p", { class: "hint" }, unmet.reason), remedyOf(problem, unmet, changing));
   };
   const list = h("ul", { class: "unmet", id: "unmet" });
   const portions = new Portions(list, wanted, item, (button) => h("li", {}, button));
   const count = plan.unmet.length;
-  const title = count ? filledText(counted(count, TITLES), { count, areas: problem.targets.length }) : filledText("All {areas} areas get all they need", { areas: problem.targets.length });
+  const title = count ? tn(count, "{count} of {areas} areas lacks something", "{count} of {areas} areas lack something", { areas: problem.targets.length }) : t("All {areas} areas get all they need", { areas: problem.targets.length });
   return { element: h("details", { open: count > 0 }, h("summary", {}, title), list), portions };
 }
 
@@ -41,24 +39,24 @@ function remedyOf(problem, unmet, changing) {
   const says = remedyText(problem, unmet);
   if (!says) return null;
   const gains = changeText(unmet);
-  return h("div", { class: "row remedy" }, h("p", {}, filled("Would help: {remedy}.", { remedy: says }), gains && h("span", { class: "hint" }, ` (${gains})`)), button(problem, unmet, changing));
+  return h("div", { class: "row remedy" }, h("p", {}, tNodes("Would help: {remedy}.", { remedy: says }), gains && h("span", { class: "hint" }, ` (${gains})`)), button(problem, unmet, changing));
 }
 
 function button(problem, unmet, changing) {
   const where = names(problem.targets)(unmet.target_id);
   if (!unmet.relaxation) {
     if (!unmet.step) return null;
-    return h("button", { type: "button", "aria-label": filledText("Add the visit to {area}", { area: where }), onclick: () => addVisit(unmet) }, "Add the visit");
+    return h("button", { type: "button", "aria-label": t("Add the visit to {area}", { area: where }), onclick: () => addVisit(unmet) }, t("Add the visit"));
   }
   if (changing) return null;
   const made = h("button", { type: "button", dataset: { remedy: unmet.target_id }, onclick: () => {
     allowed.set(unmet, get().problem);
     allow(unmet);
-    notify(filledText("The problem allows it now: {remedy}. Allocate again for a plan with it.", { remedy: remedyText(problem, unmet) }), "info", { title: "Undo", act: undo });
-  } }, "Apply");
+    notify(t("The problem allows it now: {remedy}. Allocate again for a plan with it.", { remedy: remedyText(problem, unmet) }), "info", { title: t("Undo"), act: undo });
+  } }, t("Apply"));
   buttons.set(made, unmet);
   mark(made, unmet);
-  return h("span", { class: "row" }, made, h("button", { type: "button", class: "quiet", hidden: true, dataset: { again: unmet.target_id }, onclick: () => set({ view: "allocate" }) }, "Allocate again"));
+  return h("span", { class: "row" }, made, h("button", { type: "button", class: "quiet", hidden: true, dataset: { again: unmet.target_id }, onclick: () => set({ view: "allocate" }) }, t("Allocate again")));
 }
 
 /** A remedy that is in the problem on screen is not offered again. */
@@ -66,8 +64,8 @@ function mark(made, unmet) {
   const before = allowed.get(unmet);
   const applied = before !== undefined && get().problem !== before;
   made.disabled = applied;
-  made.textContent = applied ? "Applied" : "Apply";
-  made.setAttribute("aria-label", filledText(applied ? "Applied for {area}" : "Apply for {area}", { area: unmet.target_id }));
+  made.textContent = applied ? t("Applied") : t("Apply");
+  made.setAttribute("aria-label", applied ? t("Applied for {area}", { area: unmet.target_id }) : t("Apply for {area}", { area: unmet.target_id }));
   if (made.nextElementSibling) made.nextElementSibling.hidden = !applied;
 }
 

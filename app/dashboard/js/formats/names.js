@@ -6,7 +6,7 @@ const WORDS = {
   name: ["name", "place", "site", "village", "town", "settlement", "locality", "area", "uav", "drone", "base", "nom", "lieu", "localite", "ville", "nome", "lugar", "local", "localidade", "aldeia", "nombre", "localidad", "sitio", "aldea", "pueblo"],
   y: ["lat", "latitude", "latitud", "y"],
   x: ["lon", "lng", "long", "longitude", "longitud", "x"],
-  amount: ["need", "needs", "demand", "load", "payload", "stock", "quantity", "qty", "amount", "units", "kg", "weight", "besoin", "besoins", "demande", "charge", "quantite", "poids", "necessidade", "necessidades", "procura", "carga", "quantidade", "peso", "necesidad", "necesidades", "demanda", "cantidad"],
+  amount: ["need", "needs", "demand", "load", "payload", "stock", "existencias", "quantity", "qty", "amount", "units", "kg", "weight", "besoin", "besoins", "demande", "charge", "quantite", "poids", "necessidade", "necessidades", "procura", "carga", "quantidade", "peso", "necesidad", "necesidades", "demanda", "cantidad"],
   level: ["urgency", "priority", "level", "severity", "urgence", "priorite", "niveau", "urgencia", "prioridade", "nivel", "prioridad"],
   deadline: ["deadline", "due", "until", "latest", "echeance", "limite", "prazo", "plazo"],
   earliest: ["earliest", "from", "debut", "inicio"],

@@ -4,16 +4,17 @@ import { amountTitle, fieldTitle } from "../columns.js";
 import { BASES, POINTS, ZONE } from "../kinds.js";
 import { beyond, DEGREES, onEarth } from "../limits.js";
 import { amountsOf, isWords, itemFields } from "../schema.js";
+import { t } from "../texts.js";
 import { wordsIn } from "../words.js";
-import { list, NUMBER, Numbers, plainText } from "./cells.js";
+import { list, NUMBER, Numbers, plainText, rowText } from "./cells.js";
 import { FormatError } from "./error.js";
 import { nameOf, onGlobe, placeOf } from "./geojson.js";
 import { meant } from "./names.js";
 
 /**
  * A list as it was found.
- * @typedef {{columns: string[], rows: {line: number, cells: string[]}[], separator: string, row: string, globe: boolean, notices: string[]}} Sheet
- *   a column without a name is ""; `row` is what a row is called, `globe` whether its positions are known to be degrees
+ * @typedef {{columns: string[], rows: {line: number, cells: string[]}[], separator: string, row: "line"|"feature", globe: boolean, notices: string[]}} Sheet
+ *   a column without a name is ""; `row` is what a row is, `globe` whether its positions are known to be degrees
  */
 
 /** Values of a right line, by field. */
@@ -54,7 +55,7 @@ function featureSheet(text) {
   const properties = [...new Set(features.flatMap((feature) => Object.keys(feature?.properties ?? {})))].filter((name) => !["longitude", "latitude"].includes(name));
   const rows = features.flatMap((feature, at) => {
     if (!feature?.geometry) {
-      notices.push(`${nameOf(feature, at)} has no geometry and was left out`);
+      notices.push(t("{feature} has no geometry and was left out", { feature: nameOf(feature, at) }));
       return [];
     }
     const place = placeOf(feature.geometry, nameOf(feature, at), notices);
@@ -92,7 +93,7 @@ export function choices(fields, kind, count, globe) {
 export function kindOf({ columns }) {
   const fields = columns.map((name) => meant(name)?.field);
   if (fields.includes("speed") || fields.includes("voyage")) return "uavs";
-  return columns.some((name) => /\bstock\b/i.test(name)) ? BASES : "targets";
+  return columns.some((name) => /\b(stock|existencias)\b/i.test(name)) ? BASES : "targets";
 }
 
 /** Whether the positions of a list are degrees, as far as its names and values tell. @param {Sheet} sheet @param {(string | null)[]} assigned */
@@ -156,7 +157,7 @@ export function guess({ columns, rows }, known) {
 export function itemsOf({ columns, rows, separator, row }, assigned, known, otherwise) {
   const fields = assigned.map((name) => known.find((each) => each.name === name) ?? null);
   const missing = known.filter(({ name, needed }) => needed && !assigned.includes(name) && otherwise[name] === undefined);
-  if (missing.length) return { items: [], faults: [`No column is ${missing.map(({ title }) => title).join(", ")}: choose it above`] };
+  if (missing.length) return { items: [], faults: [t("No column is {fields}: choose it above", { fields: missing.map(({ title }) => title).join(", ") })] };
   const numbers = new Numbers(separator, row);
   const faults = [];
   const items = rows.flatMap(({ line, cells }) => {
@@ -167,7 +168,7 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
         if (!field) return;
         const value = read((cells[at] ?? "").trim(), field, line, columns[at] ? `${field.title} (${columns[at]})` : field.title);
         if (value !== undefined) put(item, field.name, value);
-        else if (field.needed && otherwise[field.name] === undefined) throw new FormatError(`${row} ${line}: \`${field.title}\` is empty`);
+        else if (field.needed && otherwise[field.name] === undefined) throw new FormatError(t("{row}: `{column}` is empty", { row: rowText(row, line), column: field.title }));
       });
       return [item];
     } catch (error) {
@@ -180,7 +181,7 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
 
   function read(text, { schema }, line, column) {
     if (text === "") return undefined;
-    if (isWords(schema)) return wordsIn(plainText(text)) ?? refuse(line, column, text, "a list of words, such as medic; night flight, is needed");
+    if (isWords(schema)) return wordsIn(plainText(text)) ?? refuse(line, column, text, t("a list of words, such as medic; night flight, is needed"));
     if (schema.type === "string") return plainText(text);
     const value = numbers.read(text, line, column);
     const limit = beyond(value, schema);
@@ -189,7 +190,7 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
   }
 
   function refuse(line, column, text, why) {
-    throw new FormatError(`${row} ${line}: \`${column}\` is ${text}: ${why}`);
+    throw new FormatError(t("{row}: `{column}` is {text}: {why}", { row: rowText(row, line), column, text, why }));
   }
 }
 

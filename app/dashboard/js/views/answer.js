@@ -10,27 +10,27 @@ import { editorOf, judgement } from "../plan_editor.js";
 import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { routesTable } from "../routes_table.js";
-import { filled, filledText } from "../sentences.js";
 import { get, set, subscribe } from "../state.js";
 import { startTime } from "../start_time.js";
+import { t, tNodes } from "../texts.js";
 import { timeline } from "../timeline.js";
 import { unmetList } from "../unmet_list.js";
 
 const long = { routes: null, unmet: null, timeline: null };
 
 function source(answer) {
-  if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, "A plan that was changed by hand");
+  if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, t("A plan that was changed by hand"));
   const policy = answer.source_policy;
-  const how = [filledText("{algorithm}, seed {seed}", answer), " ", answeredBy(answer)];
+  const how = [t("{algorithm}, seed {seed}", { algorithm: answer.algorithm, seed: String(answer.seed) }), " ", answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
   return h("p", { class: "hint", id: "source" }, how, " ",
-    filled("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) }));
+    tNodes("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) }));
 }
 
 /** Do something to the plan on screen, in a line of its own below the figures. */
 function acts() {
   const button = (title, does) => h("button", { type: "button", onclick: does }, title);
-  return h("div", { class: "row", id: "plan-acts" }, button("Change this plan", beginDraft), button("Begin the next allocation with it", () => {
+  return h("div", { class: "row", id: "plan-acts" }, button(t("Change this plan"), beginDraft), button(t("Begin the next allocation with it"), () => {
     const { answer, answerProblem } = get();
     beginWith(visitsOf(answerProblem, answer));
     set({ view: "allocate" });
@@ -52,10 +52,10 @@ function drawMap() {
 }
 
 registerView({
-  id: "answer", title: "Answer", order: 30, layout: "panel",
+  id: "answer", title: t("Answer"), order: 30, layout: "panel",
   mount(root, { map, dock }) {
     shownMap = map;
-    const stale = staleNote("stale", "The problem was changed after this answer.");
+    const stale = staleNote("stale", t("The problem was changed after this answer."));
     const begins = startTime();
     const finder = new Finder(() => {
       for (const part of [drawRoutes, drawRest]) part(get());
@@ -94,7 +94,7 @@ registerView({
       if (draft && !draft.evaluation && !draft.refusal) return;
       Object.assign(long, { unmet: null, timeline: null });
       if (draft?.refusal) {
-        rest.replaceChildren(h("p", { class: "hint" }, "What is unmet is known as soon as no rule is broken."));
+        rest.replaceChildren(h("p", { class: "hint" }, t("What is unmet is known as soon as no rule is broken.")));
         return dock.replaceChildren();
       }
       const plan = draft?.evaluation ?? answer;
@@ -110,7 +110,7 @@ registerView({
       const state = get();
       if (!state.answer) {
         editor = null;
-        root.replaceChildren(h("p", { class: "hint" }, "No plan yet."), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, "Allocate")));
+        root.replaceChildren(h("p", { class: "hint" }, t("No plan yet.")), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, t("Allocate"))));
         return dock.replaceChildren();
       }
       if (!head.isConnected) root.replaceChildren(head, routes, rest);

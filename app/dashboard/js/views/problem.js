@@ -2,9 +2,9 @@
 
 import { running } from "../allocation.js";
 import { json } from "../api.js";
-import { amountTitle, fieldTitle } from "../columns.js";
-import { download, h, notify, shown } from "../dom.js";
-import { Fields, labelled } from "../fields.js";
+import { amountTitle, columnTitle, fieldTitle } from "../columns.js";
+import { download, h, notify } from "../dom.js";
+import { Fields, inLine, labelled, labelOf } from "../fields.js";
 import { toCsv, toGeoJson, toJson } from "../formats.js";
 import { fleetForm, moreLike } from "../fleet_form.js";
 import { Grid } from "../grid.js";
@@ -14,21 +14,22 @@ import { bring, NOT_SAID, said, takeFile } from "../intake.js";
 import { BASES, ZONES } from "../kinds.js";
 import { beyond, onEarth } from "../limits.js";
 import { edit, materials, remove, setMaterials, update } from "../problem.js";
-import { rangeLeft, stateOf } from "../plan.js";
+import { rangeLeft, stateText } from "../plan.js";
 import { registerView } from "../registry.js";
 import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
 import { get, select, set, subscribe } from "../state.js";
+import { plainNumber, shown, t, writtenNumber } from "../texts.js";
 import { wordsIn, writtenWords } from "../words.js";
 import { cornersOf, drawingControls } from "../zone_form.js";
 import { planNow } from "./allocate.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
-const KINDS = { uavs: "UAVs", targets: "Areas", [BASES]: "Bases", [ZONES]: "Zones" };
+const KINDS = { uavs: t("UAVs"), targets: t("Areas"), [BASES]: t("Bases"), [ZONES]: t("Zones") };
 /** Types of settings that have one value, and so one form field. */
 const SINGLE = ["number", "integer", "boolean", "string"];
-const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
+const PLACES = { local: t("on a plane"), wgs84: t("longitude, latitude") };
 /** Tables to fill in, by what they are of. */
-const TEMPLATES = { targets: "Template: areas", uavs: "Template: UAVs", [BASES]: "Template: bases" };
+const TEMPLATES = { targets: t("Template: areas"), uavs: t("Template: UAVs"), [BASES]: t("Template: bases") };
 
 /** Columns of numbers, words and texts, and of amounts one a material where an item has some. */
 function columnsOf(kind, problem) {
@@ -51,18 +52,18 @@ function columnsOf(kind, problem) {
 function enter(kind, id, name, text) {
   const item = get().problem[kind].find((each) => each.id === id);
   if (name === "id") {
-    if (!text || get().problem[kind].some((each) => each.id === text)) return notify(`Another id is needed than “${text}”`, "error");
+    if (!text || get().problem[kind].some((each) => each.id === text)) return notify(t("Another id is needed than “{id}”", { id: text }), "error");
     return update(kind, id, { id: text });
   }
   const schema = itemFields(get().fields, kind)[name];
   if (schema && isWords(schema)) {
     const words = text === "" ? undefined : wordsIn(text);
-    return words === null ? notify(`${name} of ${id} needs words with semicolons between`, "error") : update(kind, id, { [name]: words });
+    return words === null ? notify(t("{field} of {item} needs words with semicolons between", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error") : update(kind, id, { [name]: words });
   }
   if (schema?.type === "string") return update(kind, id, { [name]: text || undefined });
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
-  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(`${name} of ${id} needs a number`, "error");
+  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(t("{field} of {item} needs a number", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error");
   if (k === undefined || value === undefined) update(kind, id, { [field]: value });
   else {
     // Amounts that were not set are those of the load until then; a base has none.
@@ -140,7 +141,7 @@ async function fillExamples(root) {
 }
 
 function mountExamples(root) {
-  root.append(h("button", { type: "button", onclick: () => bring({ crs: get().problem.crs }, "New problem", "All is taken away") }, "Empty"));
+  root.append(h("button", { type: "button", onclick: () => bring({ crs: get().problem.crs }, t("New problem"), t("All is taken away")) }, t("Empty")));
   const fill = () => said(() => fillExamples(root));
   subscribe(["algorithms"], fill);
   fill();
@@ -154,20 +155,20 @@ function filesCard() {
     download(`${problemName || "problem"}.${ending}`, make(problem, fields), type);
   });
   return [
-    h("div", { class: "row" }, h("button", { type: "button", onclick: () => input.click() }, "Import…"), input,
+    h("div", { class: "row" }, h("button", { type: "button", onclick: () => input.click() }, t("Import…")), input,
       Object.entries(FILES).map(([title, file]) => h("button", { type: "button", dataset: { export: title }, onclick: () => save(file) }, title))),
-    h("p", { class: "hint" }, "A problem, or a list of places with whatever columns. A file can be dropped anywhere, a table pasted with Ctrl+V."),
+    h("p", { class: "hint" }, t("A problem, or a list of places with whatever columns. A file can be dropped anywhere, a table pasted with Ctrl+V.")),
     h("div", { class: "row" }, Object.entries(TEMPLATES).map(([kind, title]) => h("button", { type: "button", class: "quiet", dataset: { template: kind }, onclick: () => download(`${kind}.csv`, templateOf(kind), "text/csv") }, title))),
   ];
 }
 
 /** The way from a problem to its plan. */
 function planning() {
-  const plan = h("button", { type: "button", class: "primary", id: "plan", title: "Ctrl+Enter", onclick: planNow }, "Plan");
+  const plan = h("button", { type: "button", class: "primary", id: "plan", title: "Ctrl+Enter", onclick: planNow }, t("Plan"));
   const enable = () => { plan.disabled = running(get().job); };
   subscribe(["job"], enable);
   enable();
-  return h("div", { class: "row" }, plan, h("p", { class: "hint" }, "Finds who flies where, with what."));
+  return h("div", { class: "row" }, plan, h("p", { class: "hint" }, t("Finds who flies where, with what.")));
 }
 
 function placing(map) {
@@ -182,13 +183,13 @@ function placing(map) {
     }, title);
     return made;
   };
-  const back = h("button", { type: "button", class: "quiet", title: "Ctrl+Z", onclick: undo }, "Undo");
-  const forth = h("button", { type: "button", class: "quiet", title: "Ctrl+Shift+Z", onclick: redo }, "Redo");
+  const back = h("button", { type: "button", class: "quiet", title: "Ctrl+Z", onclick: undo }, t("Undo"));
+  const forth = h("button", { type: "button", class: "quiet", title: "Ctrl+Shift+Z", onclick: redo }, t("Redo"));
   const enable = () => { back.disabled = !get().past.length; forth.disabled = !get().future.length; };
   subscribe(["past", "future"], enable);
   enable();
   const zone = drawingControls(map);
-  const row = h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), button(BASES, "Place bases"), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
+  const row = h("div", { class: "row" }, button("uavs", t("Place UAVs")), button("targets", t("Place areas")), button(BASES, t("Place bases")), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, t("Fit map")));
   return [row, zone.steps];
 }
 
@@ -197,16 +198,16 @@ function mountInspector(root) {
   const draw = () => {
     const { selection, problem } = get();
     const item = selection && problem[selection.kind]?.find((each) => each.id === selection.id);
-    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area, a base or a zone on the map or in the table to see and change it."));
+    if (!item) return root.replaceChildren(h("p", { class: "hint" }, t("Select a UAV, an area, a base or a zone on the map or in the table to see and change it.")));
     const { kind, id } = selection;
     const at = problem[kind].indexOf(item);
     const fields = columnsOf(kind, problem).map((column) => {
       const value = column.read(item);
-      const input = h("input", { value: value === undefined ? "" : String(value), autocomplete: "off", spellcheck: "false", name: column.name, onchange: () => enter(kind, id, column.name, input.value.trim()) });
+      const input = h("input", { value: value === undefined ? "" : column.text ? value : writtenNumber(value), autocomplete: "off", spellcheck: "false", name: column.name, onchange: () => enter(kind, id, column.name, column.text ? input.value.trim() : plainNumber(input.value.trim())) });
       return labelled(column.title, input, { pointer: `/${kind}/${at}/${column.name}` });
     });
-    const facts = kind === "uavs" ? `${stateOf(item)}, range left ${shown(rangeLeft(item), 6)} of ${shown(item.voyage, 6)}` : "";
-    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
+    const facts = kind === "uavs" ? t("{state}, range left {left} of {range}", { state: stateText(item), left: shown(rangeLeft(item), 6), range: shown(item.voyage, 6) }) : "";
+    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, t("Delete"))), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
   };
   subscribe(["selection", "problem", "fields"], draw);
   draw();
@@ -227,11 +228,11 @@ function mountSettings(root) {
     const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties, nullable }]) => {
       // What may be left out is not there while nothing of it is filled in.
       const taken = (values) => (nullable && !Object.keys(values).length ? undefined : values);
-      const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, `${name[0].toUpperCase()}${name.slice(1)} ${inner}`])) : {};
+      const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, t("{object} {field}", { object: labelOf(name), field: inLine(labelOf(inner)) })])) : {};
       const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
       return form.element;
     });
-    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
+    root.replaceChildren(h("div", { class: "grid2" }, labelled(t("Positions"), where, { pointer: "/crs" }), labelled(t("Decision steps"), most, { pointer: "/max_steps" }), labelled(t("Kinds of material"), kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
   };
   let known = null;
   const redraw = ({ problem, fields }) => {
@@ -247,17 +248,17 @@ function mountSettings(root) {
 }
 
 registerView({
-  id: "problem", title: "Problem", order: 10, layout: "panel",
+  id: "problem", title: t("Problem"), order: 10, layout: "panel",
   mount(root, { map, dock }) {
     const examples = h("div", { class: "row" });
     const inspector = h("div", {});
     const settings = h("div", { class: "block" });
     root.append(
       planning(),
-      h("div", { class: "block" }, h("h2", {}, "Examples"), examples),
-      h("div", { class: "block" }, h("h2", {}, "Import and export"), ...filesCard()),
-      h("div", { class: "block" }, h("h2", {}, "Edit"), ...placing(map), fleetForm(map), inspector),
-      h("details", {}, h("summary", {}, "Settings of the problem"), settings),
+      h("div", { class: "block" }, h("h2", {}, t("Examples")), examples),
+      h("div", { class: "block" }, h("h2", {}, t("Import and export")), ...filesCard()),
+      h("div", { class: "block" }, h("h2", {}, t("Edit")), ...placing(map), fleetForm(map), inspector),
+      h("details", {}, h("summary", {}, t("Settings of the problem")), settings),
     );
     mountTables(dock);
     mountInspector(inspector);
