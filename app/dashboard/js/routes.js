@@ -10,6 +10,8 @@ import { t } from "./texts.js";
 
 /** With more stops than this only the selected route has numbers and arrows, and the lines are thinner. */
 const FEW_STOPS = 80;
+/** With more than this, lines are fine and let through what is below; the selected one is as always. */
+const DENSE_STOPS = 600;
 const ORDER_PX = 16;
 /** Where a number is beside the middle of its stop. */
 const ORDER_AT = { left: 8, top: -27 };
@@ -52,6 +54,7 @@ export class Routes {
     Object.assign(this, { problem, present, latLng, underWay });
     const stops = sum(routes.map((route) => route.stops.length));
     this.few = stops <= FEW_STOPS;
+    this.map.getContainer().classList.toggle("dense", stops > DENSE_STOPS);
     const nameOf = routes.length ? placeNames(problem) : null;
     for (const { uav, flights, stops: visits } of routes) {
       const says = () => h("span", {}, t("{uav}: {places}", { uav: called(uav), places: visits.map(({ place }) => nameOf(place)).join(" → ") }));

@@ -23,8 +23,8 @@ function source(answer) {
   const policy = answer.source_policy;
   const how = [t("{algorithm}, seed {seed}", { algorithm: answer.algorithm, seed: String(answer.seed) }), " ", answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
-  return h("p", { class: "hint", id: "source" }, how, " ",
-    tNodes("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) }));
+  return h("p", { class: "hint", id: "source" }, how, h("span", { class: "amount" },
+    tNodes("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) })));
 }
 
 /** Do something to the plan on screen, in a line of its own below the figures. */
