@@ -6,6 +6,7 @@ import json
 import pytest
 from page_files import PRESENT
 from page_modules import run_module
+from page_texts import LANGUAGES, translations
 
 _MAKE = """
     const { fieldsOf } = await load("schema.js");
@@ -179,13 +180,16 @@ def test_items_take_the_place_of_those_of_their_kind(make):
     assert (uav["loadlist"], uav["excluded"]) == ([4, 4, 0], [])
 
 
-def test_the_templates_are_read_as_they_are(make):
+@pytest.mark.parametrize("language", ["en", *(path.stem for path in LANGUAGES)])
+def test_the_templates_of_each_language_are_read_as_they_are(make, language):
     texts = run_module(
         """
         globalThis.document = { addEventListener() {} };
+        (await load("texts.js")).speak(given.language, given.texts);
         const { templateOf } = await load("import_dialog.js");
         return ["targets", "uavs", "bases"].map(templateOf);
-        """
+        """,
+        {"language": language, "texts": translations(language) if language != "en" else {}},
     )
     areas, uavs, bases = make(*texts)
     assert [each["faults"] for each in (areas, uavs, bases)] == [[], [], []]

@@ -1,4 +1,4 @@
-/** What the symbols of the map mean, and the button that brings everything into sight; controls of the Leaflet map. */
+/** What the symbols of the map mean, and the buttons to zoom and to bring everything into sight; controls of the Leaflet map. */
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { h, svg } from "./dom.js";
@@ -26,8 +26,9 @@ function meanings() {
   ];
 }
 
-/** Add both to a map. @param {L.Map} map @param {() => void} fit brings everything into sight */
+/** Add them to a map. @param {L.Map} map @param {() => void} fit brings everything into sight */
 export function addControls(map, fit) {
+  L.control.zoom({ zoomInTitle: t("Zoom in"), zoomOutTitle: t("Zoom out") }).addTo(map);
   const button = L.control({ position: "topleft" });
   button.onAdd = () => {
     const drawn = svg("svg", { viewBox: "0 0 24 24", width: 16, height: 16, "aria-hidden": "true" }, svg("path", { d: "M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5" }));

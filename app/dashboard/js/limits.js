@@ -12,9 +12,10 @@ export function onEarth(name, schema, globe) {
   return most ? { ...schema, minimum: -most, maximum: most } : schema;
 }
 
-/** A minimum as small as this only keeps numbers from being 0, and a limit as large says nothing to anybody. */
-const TINY = 1e-9;
-const NO_LIMIT = 1e9;
+/** A minimum as small as this only keeps numbers from being 0. */
+export const TINY = 1e-9;
+/** A limit beyond this, or beyond its negative, says nothing to anybody. */
+export const NO_LIMIT = 1e9;
 
 /** What a number has to be, where it is beyond its limits; null where it is not. @returns {string | null} */
 export function beyond(value, { minimum = -Infinity, maximum = Infinity, exclusiveMinimum = -Infinity }) {

@@ -145,7 +145,7 @@ export class DispatchMap {
       crs: globe ? L.CRS.EPSG3857 : L.CRS.Simple,
       minZoom: globe ? 1 : -32, maxZoom: globe ? 20 : 32, zoomSnap: 0.25, zoomDelta: 0.5,
       zoomAnimation: !CALM.matches, markerZoomAnimation: !CALM.matches, inertia: !CALM.matches,
-      attributionControl: false, fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
+      attributionControl: false, zoomControl: false, fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
     });
     if (globe) addBackground(this.map, settings);
     new Graticule(globe).addTo(this.map);
