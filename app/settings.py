@@ -66,9 +66,14 @@ class Settings(BaseSettings):
         default=None,
         pattern=r"^https?://[A-Za-z0-9.{}:-]+/[^\s;,]*$",
         description="Tile server of the dashboard's map, such as `https://tiles.example/{z}/{x}/{y}.png`; "
-        "default: none, a map without a background",
+        "default: none, and the map shows where land is",
     )
     tile_attribution: str = Field(default="", description="Whom the map names as the source of its tiles")
+    overlay_file: Path | None = Field(
+        default=None,
+        description="GeoJSON file (a FeatureCollection in degrees, at most 16 MiB) that the dashboard's map "
+        "shows above land and tiles: borders, roads, names",
+    )
 
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="What is logged at least: `debug`, `info`, `warning` or `error`"

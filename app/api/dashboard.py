@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -12,24 +13,34 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import app
+from app.api.overlay import read_overlay
 from app.api.security_headers import page_policy
 from app.settings import Settings
 
 FOLDER = "/dashboard"
 _ICON = "/favicon.ico"
 """What a browser asks for where a page names no icon, such as the page to print."""
+_OVERLAY = "/overlay.geojson"
 _FILES = Path(app.__file__).parent / "dashboard"
 # A browser asks each time whether a file has changed: after an update no old module meets a new one.
 _FRESH = {"Cache-Control": "no-cache"}
+# A folder with a version in its name never changes.
+_VERSIONED = re.compile(r"-\d+\.\d+\.\d+/")
+_LASTING = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 
 class _Files(StaticFiles):
-    """Static files that a browser checks before it uses them again."""
+    """Static files that a browser checks before it uses them again, but for those of a version.
+
+    What is kept compressed is sent as it is; its type is that of what is in it.
+    """
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """Return a file's response."""
         response = await super().get_response(path, scope)
-        response.headers.update(_FRESH)
+        response.headers.update(_LASTING if _VERSIONED.search(path) else _FRESH)
+        if path.endswith(".gz") and isinstance(response, FileResponse):
+            response.headers["Content-Encoding"] = "gzip"
         return response
 
 
@@ -39,9 +50,15 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
     Parameters
     ----------
     application
-        Gets ``/``, ``/dashboard/settings.json`` and the files beside it.
+        Gets ``/``, ``/dashboard/settings.json`` and the files beside it, and ``/overlay.geojson`` where the
+        settings name an overlay; that needs a key where others do.
     settings
         A tile server named there is the one place outside that the page may load pictures from.
+
+    Raises
+    ------
+    OSError, ValueError
+        As :func:`app.api.overlay.read_overlay`.
     """
     tiles = urlsplit(settings.tile_url or "")
     policy = page_policy(f"{tiles.scheme}://{tiles.netloc.replace('{s}', '*')}" if tiles.netloc else None)
@@ -49,6 +66,7 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
         "version": app.__version__,
         "tile_url": settings.tile_url,
         "tile_attribution": settings.tile_attribution,
+        "overlay": _OVERLAY.removeprefix("/") if settings.overlay_file else None,
     }
 
     async def show_dashboard(request: Request) -> Response:  # noqa: ARG001 - a route's signature
@@ -64,3 +82,10 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
     application.add_route(_ICON, show_icon, include_in_schema=False)
     application.add_route(f"{FOLDER}/settings.json", tell_settings, include_in_schema=False)
     application.mount(FOLDER, _Files(directory=_FILES))
+    if settings.overlay_file:
+        overlay = read_overlay(settings.overlay_file)
+
+        async def show_overlay(request: Request) -> Response:  # noqa: ARG001 - a route's signature
+            return Response(overlay, media_type="application/geo+json", headers=_FRESH)
+
+        application.add_route(_OVERLAY, show_overlay, include_in_schema=False)

@@ -2467,3 +2467,10 @@ class PlanChoices(TypedDict):
 
     max_descent: NotRequired[float]
     """With delivery=payload-place: m it may go down to find the ground; 0: no limit."""
+
+    title: NotRequired[str | None]
+    """html: what stands above the plan; default: its id."""
+
+    begins: NotRequired[str | None]
+    """html: when the plan begins, by the clock where it is flown, as `2026-03-01T07:30`; times are of the
+    day then. Default: they count from the begin."""

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from app.domain.allocation import LaterDeadline, Relaxation
+from app.domain.clock import clock
 from app.domain.problem import Problem
+from app.domain.units import DISTANCE, SPEED, TIME, Unit
+from app.simulation import shortfalls
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.from_start import DirectNeeds
-from app.simulation.shortfalls import RANGE, STEP, TIME
 from app.simulation.visit import RULES
 
+_SHORTFALLS = ((shortfalls.RANGE, "range"), (shortfalls.TIME, "time"), (shortfalls.STEP, "steps"))
 _MOST_NAMED = 4
 """Materials of which a sentence has the amounts; `remaining` has all of them."""
+_LEAST_MINUTES = 0.5
+"""Less than that would be no time in hours and minutes."""
 
 
 class Wording:
@@ -35,7 +40,7 @@ class Wording:
         whole = target.loadlist if target.requested is None else target.requested
         lacking = [k for k, amount in enumerate(left) if amount > 0]
         named = lacking if len(lacking) <= _MOST_NAMED + 1 else lacking[:_MOST_NAMED]
-        amounts = [f"{left[k]:.6g} of {whole[k]:.6g} of material {k + 1}" for k in named]
+        amounts = [f"{left[k]:.6g} of {whole[k]:.6g} of {self._material(k)}" for k in named]
         if len(named) < len(lacking):
             amounts.append(f"{len(lacking) - len(named)} other materials")
         return " and ".join(amounts) + " missing"
@@ -63,8 +68,8 @@ class Wording:
         wind, uav = self._problem.wind, self._problem.uavs[i]
         strength = 0.0 if wind is None else wind.speed
         return (
-            f"a wind of {strength:.6g} is too strong to fly there and home from there at the speed of "
-            f"{self._uav(i)}, {uav.speed:.6g}"
+            f"a wind of {self._speed(strength)} is too strong to fly there and home from there "
+            f"at the speed of {self._uav(i)}, {self._speed(uav.speed)}"
         )
 
     def no_leg(self) -> str:
@@ -73,29 +78,29 @@ class Wording:
 
     def endurance(self, i: int, needed: float) -> str:
         """Too long in the air, even directly."""
-        return f"{self._uav(i)} would be in the air for {needed:.6g}, and has {self._usable(i):.6g}"
+        return f"{self._uav(i)} would be in the air for {self._time(needed)}, and has {self._usable(i)}"
 
     def too_early_to_wait(self, i: int, j: int, needs: DirectNeeds) -> str:
         """It opens too late to wait for."""
         opens = self._problem.targets[j].earliest
         return (
-            f"it opens at {opens:.6g}: {self._uav(i)} would be in the air for {needs.aloft:.6g}, "
-            f"{needs.waiting:.6g} of it waiting, and has {self._usable(i):.6g}"
+            f"it opens at {self._time(opens)}: {self._uav(i)} would be in the air for "
+            f"{self._time(needs.aloft)}, {self._time(needs.waiting)} of it waiting, and has {self._usable(i)}"
         )
 
     def available_until(self, i: int, landing: float) -> str:
         """It would land too late, even directly."""
-        until = self._problem.uavs[i].available_until
-        return f"{self._uav(i)} would land at {landing:.6g}, and is available until {until or 0.0:.6g}"
+        until = self._time(self._problem.uavs[i].available_until or 0.0)
+        return f"{self._uav(i)} would land at {self._time(landing)}, and is available until {until}"
 
     def blocked(self, i: int, place: int, rule: int) -> str:
         """A UAV with something left over must not fly there, whatever range, time and steps it has."""
         where = self._where(i, place)
         return f"{self._uav(i)} has some of it left over; a visit {where} is not allowed: {RULES[rule]}"
 
-    def _usable(self, i: int) -> float:
+    def _usable(self, i: int) -> str:
         uav = self._problem.uavs[i]
-        return (uav.endurance or 0.0) * (1.0 - uav.reserve)
+        return self._time((uav.endurance or 0.0) * (1.0 - uav.reserve))
 
     def _some(self, uavs: list[int]) -> str:
         named = ", ".join(self._uav(i) for i in uavs[:_MOST_NAMED])
@@ -104,13 +109,15 @@ class Wording:
     def out_of_range(self, i: int, lacks: float) -> str:
         """Nobody has the range; UAV `i` comes closest."""
         return (
-            f"no UAV that carries any of it has the range: {self._uav(i)} comes closest and lacks {lacks:.6g}"
+            f"no UAV that carries any of it has the range: {self._uav(i)} comes closest "
+            f"and lacks {self._length(lacks)}"
         )
 
     def deadline(self, i: int, late: float) -> str:
         """Nobody can be in time; UAV `i` would be there first."""
         return (
-            f"the fastest UAV that could serve it, {self._uav(i)}, would arrive {late:.6g} after its deadline"
+            f"the fastest UAV that could serve it, {self._uav(i)}, "
+            f"would arrive {self._time(late)} after its deadline"
         )
 
     def not_looked(self, i: int, spent: bool) -> str:
@@ -130,7 +137,9 @@ class Wording:
     def used(self, i: int, place: int, j: int, lacks: Relaxation) -> str:
         """The other visits of UAV `i` leave no room for one with what it has left over."""
         why = (
-            [f"it lacks {lacks.more_range:.6g} of range to keep its other visits"] if lacks.more_range else []
+            [f"it lacks {self._length(lacks.more_range)} of range to keep its other visits"]
+            if lacks.more_range
+            else []
         )
         why += [self._late(later, j) for later in lacks.later_deadlines]
         why += ["all its decision steps are used"] if lacks.more_steps else []
@@ -139,7 +148,7 @@ class Wording:
 
     def not_worth_it(self, i: int, place: int, gain: float, lacks: int) -> str:
         """The best visit with something that is left over costs at least what it earns."""
-        needs = [name for kind, name in ((RANGE, "range"), (TIME, "time"), (STEP, "steps")) if lacks & kind]
+        needs = [name for kind, name in _SHORTFALLS if lacks & kind]
         even = f"even with the {' and '.join(needs)} that it lacks, " if needs else ""
         visit = f"{even}one more visit by {self._uav(i)}, {self._where(i, place)},"
         if gain < 0:
@@ -161,7 +170,8 @@ class Wording:
 
     def another_flight(self, i: int, d: int, gain: float) -> str:
         """A reload and a visit after all others of UAV `i` are allowed; what they bring."""
-        flight = f"another flight of {self._uav(i)}, from {self._problem.bases[d].id} at the end,"
+        base = self._problem.bases[d]
+        flight = f"another flight of {self._uav(i)}, from {base.name or base.id} at the end,"
         if gain > 0.0:
             return f"{flight} would earn {gain:.6g}; a better algorithm or more time finds it"
         if gain < 0.0:
@@ -189,28 +199,57 @@ class Wording:
         if relaxation is None:
             return f"{uav} flies there {self._where(i, place)}"
         load = " and ".join(
-            f"{x:.6g} of material {k + 1}" for k, x in enumerate(relaxation.more_load) if x > 0
+            f"{x:.6g} of {self._material(k)}" for k, x in enumerate(relaxation.more_load) if x > 0
         )
         says = [f"{load} more aboard {uav}"] if load else []
         if relaxation.more_range:
-            says.append(f"range +{relaxation.more_range:.6g} of {uav}")
+            says.append(f"range +{self._length(relaxation.more_range)} of {uav}")
         says += [
-            f"a deadline {later.by:.6g} later for {later.target_id}" for later in relaxation.later_deadlines
+            f"a deadline {self._time(later.by)} later for {self._target(later.target_id)}"
+            for later in relaxation.later_deadlines
         ]
         says += ["one more decision step"] if relaxation.more_steps else []
         return ", ".join(says) + ("" if new else ", which flies there anyway")
 
     def _late(self, later: LaterDeadline, j: int) -> str:
-        where = self._problem.targets[j].id
-        if later.target_id == where:
-            return f"it would arrive {later.by:.6g} after the deadline"
-        return f"it would then arrive {later.by:.6g} after the deadline of {later.target_id}"
+        late = f"{self._time(later.by)} after the deadline"
+        if later.target_id == self._problem.targets[j].id:
+            return f"it would arrive {late}"
+        return f"it would then arrive {late} of {self._target(later.target_id)}"
 
     def _uav(self, i: int) -> str:
-        return self._problem.uavs[i].id
+        uav = self._problem.uavs[i]
+        return uav.name or uav.id
+
+    def _target(self, target_id: str) -> str:
+        return next(each.name or each.id for each in self._problem.targets if each.id == target_id)
+
+    def _material(self, k: int) -> str:
+        named = self._problem.materials
+        return named[k].name if named else f"material {k + 1}"
 
     def _where(self, i: int, place: int) -> str:
         if place == 0:
             return "first"
         stop, n = int(self._plan.visits.target[i, place - 1]), self._problem.n_targets
-        return f"after {self._problem.targets[stop].id if stop < n else self._problem.bases[stop - n - 1].id}"
+        before = self._problem.targets[stop] if stop < n else self._problem.bases[stop - n - 1]
+        return f"after {before.name or before.id}"
+
+    def _length(self, length: float) -> str:
+        return f"{length:.6g}{self._unit(DISTANCE)}"
+
+    def _speed(self, speed: float) -> str:
+        return f"{speed:.6g}{self._unit(SPEED)}"
+
+    def _time(self, time: float) -> str:
+        """Write a moment or a duration; less than half a minute is written exactly."""
+        if not self._on_globe:
+            return f"{time:.6g}"
+        return f"{clock(time) if abs(time) * 60 >= _LEAST_MINUTES else f'{time:.6g}'}{self._unit(TIME)}"
+
+    def _unit(self, unit: Unit) -> str:
+        return f" {unit.wgs84}" if self._on_globe else ""
+
+    @property
+    def _on_globe(self) -> bool:
+        return self._problem.crs == "wgs84"

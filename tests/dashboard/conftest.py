@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from dashboard_steps import PATIENCE_MS
+from dashboard_steps import ADVANCED, PATIENCE_MS
 from live_service import LiveService
 from page_files import read_files
 from playwright.sync_api import Browser, Page, expect, sync_playwright
@@ -97,6 +97,7 @@ def _dashboard(browser: Browser, url: str) -> Iterator[Page]:
     """Open the dashboard; at the end nothing may have gone wrong in it, and nothing left the machine."""
     context = browser.new_context(viewport={"width": 1366, "height": 900}, accept_downloads=True)
     context.set_default_timeout(PATIENCE_MS)
+    context.add_init_script(ADVANCED)
     opened = context.new_page()
     troubles = []
     opened.on("console", lambda said: troubles.append(said.text) if said.type == "error" else None)

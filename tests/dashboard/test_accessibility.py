@@ -3,7 +3,7 @@
 import httpx
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
-from dashboard_steps import PATIENCE_MS, begin_again, go, open_problem, ready, show_answer, state
+from dashboard_steps import ADVANCED, PATIENCE_MS, begin_again, go, open_problem, ready, show_answer, state
 from playwright.sync_api import expect
 
 from app.api.openapi_examples import example_problem
@@ -29,6 +29,7 @@ def auditing(browser, service):
         viewport={"width": 1366, "height": 900}, bypass_csp=True, reduced_motion="reduce"
     )
     context.set_default_timeout(PATIENCE_MS)
+    context.add_init_script(ADVANCED)
     page = context.new_page()
     page.goto(service.url)
     page.evaluate(AXE_SCRIPT)
@@ -66,6 +67,12 @@ def test_no_view_breaks_a_rule(audited, service, width, scheme):
     page.click("#key")
     faults["key"] = violations(page)
     page.click("#key-cancel")
+    go(page, "problem")
+    page.locator("#import").set_input_files(
+        {"name": "list.csv", "mimeType": "text/csv", "buffer": b"name,lat,lon,need\nA,1,2,3\nB,1,east,3\n"}
+    )
+    faults["import"] = violations(page)
+    page.keyboard.press("Escape")
 
     assert {view: found for view, found in faults.items() if found} == {}
 
@@ -87,6 +94,21 @@ def test_no_refusal_and_no_message_breaks_a_rule(audited):
     assert violations(page) == []
     close.click()
     expect(page.locator("#alerts .notice")).to_have_count(0)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_neither_the_legend_nor_the_list_of_a_place_breaks_a_rule(audited, scheme):
+    page = audited
+    page.emulate_media(color_scheme=scheme)
+    legend = page.locator(".legend summary")
+    legend.click()
+    page.locator(".symbol.starts").click()
+    expect(page.locator(".crowd-list button").first).to_be_visible()
+    found = violations(page)
+    legend.click()
+    page.locator(".leaflet-popup-close-button").click()
+
+    assert found == []
 
 
 def test_no_zone_breaks_a_rule(audited):

@@ -93,7 +93,7 @@ def test_the_answer_on_screen_is_the_services(again, service):
         for path in page.locator("path.route").all()
     }
     assert on_map == {route["uav_id"]: [stop["target_id"] for stop in route["stops"]] for route in flown}
-    rows = page.locator("#routes tbody tr").all()
+    rows = page.locator("#routes tr[data-step]").all()
     stops = [(route["uav_id"], stop) for route in flown for stop in route["stops"]]
     assert len(rows) == len(stops)
     for row, (uav_id, stop) in zip(rows, stops, strict=True):
@@ -227,7 +227,7 @@ def test_what_was_clicked_stays_under_the_pointer(ready):
             return visited;
         }"""
     )
-    button = page.locator(f"#unmet li[data-target-id='{unmet}'] button").last
+    button = page.locator(f"#unmet li[data-target-id='{unmet}'] button[title]").last
     button.scroll_into_view_if_needed()
     before = button.bounding_box()
     button.click()
@@ -251,7 +251,7 @@ def test_the_bound_and_the_gap_to_it_are_shown_where_asked_for(again, service):
     page = again
     page.select_option("[data-pointer='/bound'] select", "true")
     start(page, "local_search", "2")
-    page.wait_for_selector("[data-figure=Gap]")
+    page.wait_for_selector("[data-figure=Gap]", state="attached")
     answer = newest_job(service)["result"]
     assert (figure(page, "Bound"), figure(page, "Gap")) == (answer["bound"], answer["gap"])
     assert answer["bound"] >= answer["reward"]

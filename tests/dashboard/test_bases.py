@@ -41,9 +41,9 @@ def shown(page, service):
 
 def test_the_routes_have_reloads_and_flights(shown):
     page, answer = shown
-    first, reload, last = page.locator("#routes tbody tr").all()
-    expect(first).to_contain_text("2 flights")
-    expect(first).to_contain_text("to base Depot")
+    head, _, reload, last = page.locator("#routes tbody tr").all()
+    expect(head).to_contain_text("2 flights")
+    expect(head).to_contain_text("to base Depot")
     expect(reload).to_contain_text("base Depot")
     expect(reload).to_contain_text("loads 4")
     expect(reload).to_contain_text("flies on from 6.5")
@@ -62,9 +62,9 @@ def test_the_timeline_has_turnarounds(shown):
     titles = bars.evaluate_all("all => all.map((each) => [each.className, each.title])")
     assert titles[:5] == [
         ["leg", "flight 1, to Village"],
-        ["visit", "1. Village at 4: 3"],
+        ["visit", "1. Village at 4: 3 units"],
         ["leg", "flight 1, to base Depot"],
-        ["turnaround", "2. base Depot at 5.5: loads 4, takes off from 6.5"],
+        ["turnaround", "2. base Depot at 5.5: loads 4 units, takes off from 6.5"],
         ["wait", "waits for b on the ground until 28"],
     ]
     assert titles[5] == ["leg", "flight 2, to b"]
@@ -75,11 +75,9 @@ def test_the_map_has_a_line_a_flight_and_the_base(shown):
     lines = page.locator("path.route").evaluate_all("all => all.map((each) => each.dataset.flight)")
     assert lines == ["1", "2"]
     assert page.locator(".order").all_inner_texts() == ["1", "2", "3"]
-    depot = page.locator(".symbol.bases")
-    expect(depot).to_contain_text("Depot")
-    expect(depot).to_contain_text("9")
-    depot.hover()
-    expect(page.locator(".leaflet-tooltip")).to_contain_text("after the plan 5")
+    expect(page.locator(".name[data-kind=bases]")).to_have_text("Depot9 units")
+    page.locator(".symbol.bases").hover()
+    expect(page.locator(".leaflet-tooltip")).to_contain_text("after the plan 5 units")
 
 
 def test_a_plan_with_reloads_is_changed_by_hand_and_begun_with(shown):

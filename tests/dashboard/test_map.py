@@ -15,8 +15,8 @@ IN_SIGHT = """() => {
 }"""
 LOOKS = """() => Object.fromEntries([...document.querySelectorAll(".symbol.uavs")].map((symbol) => {
     const { style, classList } = symbol.querySelector("svg");
-    const of = (name) => style.getPropertyValue(name);
-    return [symbol.dataset.id, [of("--hue"), of("--shade"), classList.contains("dashed")].join(" ")];
+    const pattern = [...classList].find((name) => name.startsWith("pattern-"));
+    return [symbol.dataset.id, [style.getPropertyValue("--own"), pattern].join(" ")];
 }))"""
 
 

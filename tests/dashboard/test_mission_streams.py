@@ -105,6 +105,7 @@ def test_after_a_lost_connection_it_goes_on_with_what_has_happened(browser, serv
     ready(page)
     link = page.get_by_test_id("mission-link")
     expect(link).to_have_text("not connected")
+    page.wait_for_selector("li[data-number]", state="attached")
     mission.tell("go", type="clock", at=1)
     mission.tell("lost", type="uav_lost", uav_id="u2")
     assert [each["number"] for each in state(page, "openMission")["events"]] == list(range(known, 0, -1))

@@ -14,6 +14,9 @@ PATIENCE_MS = 60_000
 
 QUICK = {"algorithm": "greedy"}
 
+ADVANCED = "localStorage.setItem('dispatch-advanced', 'true')"
+"""A script for pages of people who have opened what is advanced, and find it open again."""
+
 
 def ready(page: Page) -> None:
     """Wait until the page has its first problem."""

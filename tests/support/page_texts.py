@@ -43,6 +43,14 @@ def places(text: str) -> set[str]:
     return set(_PLACES.findall(text))
 
 
+def translations(code: str) -> dict[str, str | dict[str, str]]:
+    """Return the texts of a language by the English ones; those with a count by their plural form."""
+    found: dict[str, str | dict[str, str]] = json.loads(
+        (DASHBOARD / "languages" / f"{code}.json").read_text()
+    )
+    return found
+
+
 def source_texts() -> SourceTexts:
     """Read all modules and the markup."""
     found = SourceTexts()

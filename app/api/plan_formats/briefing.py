@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from app.api.plan_formats.altitudes import altitude_text
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
-from app.api.plan_formats.printed_text import called, clock, position_text
+from app.api.plan_formats.printed_text import called, position_text
+from app.domain.clock import clock
 
 
 def briefing(plan: FlownPlan, flights: Sequence[PlannedFlight]) -> str:

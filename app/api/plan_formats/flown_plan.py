@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, NamedTuple
 
 from app.api.plan_formats.flights import AT_PLACE, Flight, FlownLanding, FlownReload, FlownStop, Point, Points
@@ -58,11 +59,12 @@ class FlownRoute:
 
 @dataclass(frozen=True, slots=True)
 class UnmetNeed:
-    """What a rescue area still needs after the plan, and why."""
+    """What a rescue area still needs after the plan, why, and what simple thing would help, if any."""
 
     target: Target
     remaining: tuple[float, ...]
     reason: str
+    remedy: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +94,10 @@ class FlownPlan:
         and landings, ways.
     stocks
         What every base has left.
+    title
+        What people call it; None: nobody has said.
+    begins
+        When it begins, by the clock where it is flown; None: nobody has said.
     """
 
     job_id: str
@@ -104,6 +110,8 @@ class FlownPlan:
     unmet: tuple[UnmetNeed, ...]
     in_world: bool
     stocks: tuple[StockLeft, ...]
+    title: str | None = None
+    begins: datetime | None = None
 
     @property
     def flying(self) -> tuple[FlownRoute, ...]:
@@ -137,7 +145,9 @@ def flown_plan(problem: Problem, answer: Mapping[str, Any]) -> FlownPlan:
         problem=problem,
         routes=flown_routes(problem, answer["routes"]),
         unmet=tuple(
-            UnmetNeed(targets[each["target_id"]], tuple(each["remaining"]), each["reason"])
+            UnmetNeed(
+                targets[each["target_id"]], tuple(each["remaining"]), each["reason"], each.get("remedy")
+            )
             for each in answer["unmet"]
         ),
         in_world=answer.get("makespan") is not None,

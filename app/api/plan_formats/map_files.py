@@ -11,7 +11,8 @@ from app.api.plan_formats.flights import Flight, Point
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
 from app.api.plan_formats.mission import Altitude
-from app.api.plan_formats.printed_text import amounts_text, called, clock
+from app.api.plan_formats.printed_text import amounts_text, called
+from app.domain.clock import clock
 
 KML_TYPE = "application/vnd.google-earth.kml+xml"
 GPX_TYPE = "application/gpx+xml"

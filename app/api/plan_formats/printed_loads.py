@@ -6,12 +6,16 @@ from html import escape
 
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.load_sheet import Loading, loadings
-from app.api.plan_formats.printed_text import amounts_text, called, time_text
+from app.api.plan_formats.printed_text import amounts_text, called, materials_text, time_text
 
 
 def load_tables(plan: FlownPlan) -> str:
     """Write the load sheet, and the stock of every base before and after the plan."""
     rows = "".join(_row(plan, each) for each in loadings(plan))
+
+    def materials(title: str) -> str:
+        return escape(materials_text(plan, title))
+
     stocks = "".join(
         f'<tr><td>{escape(called(each.base))}</td><td class="n">{_stock(each.base.stock)}</td>'
         f'<td class="n">{_stock(each.amounts)}</td></tr>'
@@ -20,10 +24,11 @@ def load_tables(plan: FlownPlan) -> str:
     return (
         "<section><h2>Load sheet</h2><table><thead><tr><th>Where</th><th>UAV</th>"
         '<th class="n">Flight</th><th class="n">Lands</th><th class="n">Takes off</th>'
-        '<th class="n">Load</th><th class="n">Aboard</th><th>Done</th></tr></thead>'
+        f'<th class="n">{materials("Load")}</th><th class="n">{materials("Aboard")}</th>'
+        "<th>Done</th></tr></thead>"
         f"<tbody>{rows}</tbody></table></section>"
-        '<section><h2>Stocks</h2><table><thead><tr><th>Base</th><th class="n">Before</th>'
-        f'<th class="n">After</th></tr></thead><tbody>{stocks}</tbody></table></section>'
+        f'<section><h2>Stocks</h2><table><thead><tr><th>Base</th><th class="n">{materials("Before")}</th>'
+        f'<th class="n">{materials("After")}</th></tr></thead><tbody>{stocks}</tbody></table></section>'
     )
 
 

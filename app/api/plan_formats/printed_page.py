@@ -16,6 +16,7 @@ from app.api.plan_formats.printed_text import (
     amounts_text,
     called,
     duration_text,
+    materials_text,
     position_text,
     time_text,
     unit_text,
@@ -24,38 +25,85 @@ from app.domain.geometry import unrolled
 from app.domain.problem import Target
 from app.domain.surroundings import Base
 
+_SIGN = (
+    '<p class="sign"><span>Loaded by</span><span>Checked by</span><span>Took off at</span>'
+    "<span>Landed at</span></p>"
+)
 _WIDTH, _HEIGHT, _MARGIN = 720.0, 440.0, 24.0
-_COLOURS = ("#0b6e99", "#b4451f", "#3d7a2a", "#7a3f9d", "#a17a00", "#00736b", "#a8325e", "#4a5568")
+COLOURS = ("#1150cd", "#938606", "#a92a13", "#0089e5", "#6e1731", "#d55c8c", "#431c90", "#754c7d")
+"""Of UAVs by their place in the swarm: those of the dashboard in daylight."""
+_PATTERNS = ("", "9 5", "2 4", "9 4 2 4")
+"""Dashes of lines: another one each time that the colours begin again."""
+_NAME_AT = 0.5
+"""Where on its first leg a UAV's name stands."""
+_MOST_NAMED = 24
+"""With more UAVs that fly their names would cover the map."""
 _STYLE = """
 body { font: 11pt/1.4 system-ui, sans-serif; color: #111; max-width: 190mm; margin: 10mm auto }
 h1 { font-size: 17pt; margin: 0 0 1mm } h2 { font-size: 13pt; margin: 0 0 1mm }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }
-th, td { text-align: left; padding: 1mm 2mm; border-bottom: 1px solid #bbb }
-td.n, th.n { text-align: right } td { white-space: nowrap } td.why { white-space: normal }
+table { border-collapse: collapse; width: 100%; font-size: 9pt; font-variant-numeric: tabular-nums }
+th, td { text-align: left; padding: 1mm 1.2mm; border-bottom: 1px solid #bbb }
+td.n, th.n { text-align: right } td { white-space: nowrap } td:nth-child(2) { white-space: normal }
+td.why { white-space: normal }
 section { break-inside: avoid; margin: 6mm 0 } svg { width: 100%; border: 1px solid #bbb }
 .key { display: inline-block; width: 3mm; height: 3mm; margin-right: 2mm } p { margin: 1mm 0 3mm }
-.done { width: 14mm } @page { margin: 12mm }
+.done { width: 14mm }
+.sign { display: flex; gap: 6mm; margin: 3mm 0 0 }
+.sign span { flex: 1; border-bottom: 1px solid #111; padding-top: 6mm }
+@page { margin: 12mm }
 """
 
 
 def printed_page(plan: FlownPlan) -> str:
     """Write the page; times are h and distances km in a ``wgs84`` problem, its own units otherwise."""
-    title = f"Plan {plan.job_id[:8]}"
+    name = f"Plan {plan.job_id[:8]}"
+    title = plan.title or name
     return "".join(
         [
             '<!doctype html><html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width">',
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
             f"<h1>{escape(title)}</h1>",
-            f"<p>{escape(plan.algorithm)}: reward {plan.reward:.4g}, satisfaction {plan.satisfaction:.4g}, "
-            f"distance {plan.distance:.5g}{unit_text(plan, ' km')}. "
-            f"{len(plan.flying)} of {len(plan.routes)} UAVs fly.{_world(plan)}</p>",
+            f"<p>{name}{_begin(plan)}</p>",
+            f"<p><strong>{_figures(plan)}</strong></p>",
+            f"<p>{len(plan.flying)} of {len(plan.routes)} UAVs fly.{_world(plan)} "
+            f"{escape(plan.algorithm)}: reward {plan.reward:.4g}, satisfaction {plan.satisfaction:.4g}, "
+            f"distance {plan.distance:.5g}{unit_text(plan, ' km')}.</p>",
             _map(plan),
             *(_card(plan, route) for route in plan.flying),
             load_tables(plan) if plan.has_bases else "",
             _unmet(plan),
             "</body></html>\n",
         ]
+    )
+
+
+def _begin(plan: FlownPlan) -> str:
+    """Say when the plan begins, and what its times count from."""
+    if plan.problem.crs != "wgs84":
+        return ""
+    if plan.begins is None:
+        return ", begins on ____________ at ________; times count from then"
+    return f", begins on {plan.begins:%Y-%m-%d} at {plan.begins:%H:%M}; times are of the day"
+
+
+def _figures(plan: FlownPlan) -> str:
+    """Say who is served, how much arrives, when the last of it does, and when all are home."""
+    areas = len(plan.problem.targets)
+    asked = [target.requested or target.loadlist for target in plan.problem.targets]
+    arrived = [sum(each) for each in zip(*asked, strict=True)]
+    whole = tuple(arrived)
+    for each in plan.unmet:
+        arrived = [had - lacks for had, lacks in zip(arrived, each.remaining, strict=True)]
+    delivered = " · ".join(f"{part:g} of {all_:g}" for part, all_ in zip(arrived, whole, strict=True))
+    unloaded = [stop.departure_time for route in plan.flying for stop in route.stops]
+    home = [route.landing.time for route in plan.flying]
+    last = time_text(plan, max(unloaded)) if unloaded else "–"
+    landed = time_text(plan, max(t for t in home if t is not None)) if home and None not in home else "–"
+    return (
+        f"{areas - len(plan.unmet)} of {areas} areas get all they need. "
+        f"{escape(materials_text(plan, 'Delivered'))}: {delivered}. "
+        f"Last delivery {last}, all home {landed}."
     )
 
 
@@ -83,12 +131,14 @@ def _card(plan: FlownPlan, route: FlownRoute) -> str:
     return (
         f'<section><h2><span class="key" style="background:{_colour(route)}"></span>'
         f"{escape(called(uav))}</h2>"
-        f"<p>Load {amounts_text(uav.loadlist)}; range left {uav.voyage - uav.dis:g}{unit_text(plan, ' km')}; "
+        f"<p>{escape(materials_text(plan, 'Load'))}: {amounts_text(uav.loadlist)}; "
+        f"range left {uav.voyage - uav.dis:g}{unit_text(plan, ' km')}; "
         f"speed {uav.speed:g}{unit_text(plan, ' km/h')}{_take_off(plan, route.flights[0])}</p>"
         "<table><thead><tr><th>#</th><th>Where</th><th>Position</th>"
-        f'<th class="n">Arrival</th>{times}<th class="n">Leg{km}</th><th class="n">Unload</th>'
+        f'<th class="n">Arrival</th>{times}<th class="n">Leg{km}</th>'
+        f'<th class="n">{escape(materials_text(plan, "Unload"))}</th>'
         f'<th class="n">Range left{km}</th><th>Done</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></section>"
+        f"<tbody>{''.join(rows)}</tbody></table>{_SIGN}</section>"
     )
 
 
@@ -154,17 +204,25 @@ def _unmet(plan: FlownPlan) -> str:
         return "<section><h2>Unmet needs</h2><p>None: every area gets all it needs.</p></section>"
     rows = "".join(
         f'<tr><td>{escape(called(each.target))}</td><td class="n">{each.target.level:g}</td>'
-        f'<td class="n">{amounts_text(each.remaining)}</td><td class="why">{escape(each.reason)}</td></tr>'
+        f'<td class="n">{amounts_text(each.remaining)}</td><td class="why">{escape(each.reason)}</td>'
+        f'<td class="why">{escape(each.remedy or "–")}</td></tr>'
         for each in plan.unmet
     )
     return (
         '<section><h2>Unmet needs</h2><table><thead><tr><th>Area</th><th class="n">Level</th>'
-        f'<th class="n">Still needed</th><th>Why</th></tr></thead><tbody>{rows}</tbody></table></section>'
+        f'<th class="n">{escape(materials_text(plan, "Still needed"))}</th><th>Why</th><th>Would help</th>'
+        f"</tr></thead><tbody>{rows}</tbody></table></section>"
     )
 
 
 def _colour(route: FlownRoute) -> str:
-    return _COLOURS[route.number % len(_COLOURS)]
+    return COLOURS[route.number % len(COLOURS)]
+
+
+def _pattern(route: FlownRoute) -> str:
+    """Return the dashes of a route's line, as an attribute."""
+    dashes = _PATTERNS[route.number // len(COLOURS) % len(_PATTERNS)]
+    return f' stroke-dasharray="{dashes}"' if dashes else ""
 
 
 def _map(plan: FlownPlan) -> str:
@@ -205,6 +263,7 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
             f'<polygon points="{points}" fill="#c22" fill-opacity="0.15" stroke="#c22" '
             f'stroke-dasharray="4 2"><title>{escape(called(zone))}</title></polygon>'
         )
+    named = len(plan.flying) <= _MOST_NAMED
     for route in plan.flying:
         way = [route.flights[0].place]
         for flight in route.flights:
@@ -213,15 +272,25 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
             way += flight.landing.path[1:]
         for line in _lines([(on_map[x], y) for x, y in way], around):
             points = " ".join("{:.1f},{:.1f}".format(*place(x, y)) for x, y in line)
-            yield f'<polyline points="{points}" fill="none" stroke="{_colour(route)}" stroke-width="1.5"/>'
+            yield (
+                f'<polyline points="{points}" fill="none" stroke="{_colour(route)}" '
+                f'stroke-width="1.5"{_pattern(route)}/>'
+            )
+        if named:
+            (x_a, y_a), (x_b, y_b) = (place(on_map[x], y) for x, y in way[:2])
+            yield (
+                f'<text x="{x_a + _NAME_AT * (x_b - x_a):.1f}" y="{y_a + _NAME_AT * (y_b - y_a):.1f}" '
+                f'font-weight="bold" stroke="#fff" stroke-width="3" paint-order="stroke" '
+                f'fill="{_colour(route)}">{escape(route.uav.name or route.uav.id)}</text>'
+            )
     for target in problem.targets:
         x, y = at(target.x, target.y)
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#fff" stroke="#111"/>'
-        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(called(target))}</text>'
+        yield f'<text x="{x + 6:.1f}" y="{y + 3:.1f}">{escape(target.name or target.id)}</text>'
     for base in problem.bases:
         x, y = at(base.x, base.y)
         yield f'<path d="M{x - 5:.1f} {y - 5:.1f}h10v10h-10z" fill="#fff" stroke="#111" stroke-width="2"/>'
-        yield f'<text x="{x + 8:.1f}" y="{y + 3:.1f}">{escape(called(base))}</text>'
+        yield f'<text x="{x + 8:.1f}" y="{y + 3:.1f}">{escape(base.name or base.id)}</text>'
     for x_s, y_s in {(uav.x_s, uav.y_s) for uav in problem.uavs}:
         x, y = at(x_s, y_s)
         yield f'<path d="M{x:.1f} {y - 6:.1f}l5 9h-10z" fill="#111"/>'

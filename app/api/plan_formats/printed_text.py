@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from app.api.plan_formats.flown_plan import FlownPlan
+from app.domain.clock import clock
 from app.domain.problem import UAV, Target
 from app.domain.surroundings import Base, NoFlyZone
 
-
-def clock(hours: float) -> str:
-    """Write a time in h as hours and minutes, rounded to the minute."""
-    minutes = round(hours * 60)
-    return f"{minutes // 60}:{minutes % 60:02d}"
+_DAY_MINUTES = 24 * 60
+_BETWEEN = " · "
 
 
 def unit_text(plan: FlownPlan, unit: str) -> str:
@@ -24,20 +22,34 @@ def called(item: UAV | Target | Base | NoFlyZone) -> str:
 
 
 def time_text(plan: FlownPlan, time: float | None) -> str:
-    """Write a time from the plan's begin; a dash where it is not known."""
+    """Write a time: of the day where it is known when the plan begins, from its begin otherwise.
+
+    A dash where the time is not known.
+    """
     if time is None:
         return "–"
-    return f"+{clock(time)} h" if plan.problem.crs == "wgs84" else f"{time:.4g}"
+    if plan.problem.crs != "wgs84":
+        return f"{time:.4g}"
+    if plan.begins is None:
+        return f"+{clock(time)} h"
+    days, minutes = divmod(60 * plan.begins.hour + plan.begins.minute + round(60 * time), _DAY_MINUTES)
+    return f"{minutes // 60:02d}:{minutes % 60:02d}" + (f" +{days} d" if days else "")
 
 
 def amounts_text(amounts: tuple[float, ...]) -> str:
     """Write amounts, one a material."""
-    return " · ".join(f"{amount:g}" for amount in amounts)
+    return _BETWEEN.join(f"{amount:g}" for amount in amounts)
+
+
+def materials_text(plan: FlownPlan, title: str) -> str:
+    """Write what stands above amounts: a title, and the names of the materials where they have any."""
+    named = plan.problem.materials
+    return f"{title}: {_BETWEEN.join(each.name for each in named)}" if named else title
 
 
 def duration_text(plan: FlownPlan, time: float) -> str:
     """Write how long something takes."""
-    return time_text(plan, time).removeprefix("+")
+    return f"{clock(time)} h" if plan.problem.crs == "wgs84" else f"{time:.4g}"
 
 
 def position_text(plan: FlownPlan, x: float, y: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from enum import StrEnum
 from typing import Annotated
 
@@ -269,6 +270,16 @@ async def get_plan(
             description="With delivery=payload-place: m it may go down to find the ground; 0: no limit",
         ),
     ] = 0.0,
+    title: Annotated[
+        str | None, Query(max_length=200, description="html: what stands above the plan; default: its id")
+    ] = None,
+    begins: Annotated[
+        datetime | None,
+        Query(
+            description="html: when the plan begins, by the clock where it is flown, as `2026-03-01T07:30`; "
+            "times are of the day then. Default: they count from the begin"
+        ),
+    ] = None,
 ) -> Response:
     """Write a plan in a format of the field.
 
@@ -296,7 +307,9 @@ async def get_plan(
         clearance_m=clearance,
     )
     job = await services.jobs.get(job_id)
-    return await run_in_threadpool(_file, job, format, uav, choices, separation, altitude_of or ())
+    return await run_in_threadpool(
+        _file, job, format, uav, choices, separation, altitude_of or (), title, begins
+    )
 
 
 def _file(
@@ -306,11 +319,15 @@ def _file(
     choices: FlightChoices,
     separation: Separation,
     altitude_of: Sequence[str],
+    title: str | None,
+    begins: datetime | None,
 ) -> Response:
     answer = result_of(job)
     if answer is None or "routes" not in answer:
         raise NoPlan(job.id, job.kind, job.status.value)
     plan = flown_plan(problem_from_record(job.payload["problem"]), answer)
+    if format is PlanFormat.HTML:
+        plan = replace(plan, title=title, begins=begins)
     kind = _FORMATS[format]
     if isinstance(kind, _Document):
         # A page is looked at in the browser, everything else is kept.

@@ -1,9 +1,9 @@
 /** What is in the air of a problem, on the map: no-fly zones, and the wind. */
 
 import * as L from "../vendor/leaflet/leaflet.js";
-import { h, shown, svg } from "./dom.js";
+import { h, svg } from "./dom.js";
 import { called } from "./plan.js";
-import { t } from "./texts.js";
+import { shown, t } from "./texts.js";
 
 /** Zones and wind on a Leaflet map. */
 export class Air {

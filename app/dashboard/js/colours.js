@@ -2,23 +2,27 @@
 
 import { get, set, subscribe } from "./state.js";
 
-const GOLDEN_ANGLE = 137.508;
-const FIRST_HUES = [250, 30, 150, 330, 85, 200, 295, 55];
-/** Hues, each plain and in another shade, each of them as a line and dashed. */
-const TOLD_APART = 4 * FIRST_HUES.length;
+/** Custom properties `--uav-0` to `--uav-7` of the style sheet: eight colours that differ for every kind of colour vision, in both themes. */
+const COLOURS = 8;
+/** Each of them as a line, dashed, dotted, and dashed and dotted. */
+const PATTERNS = 4;
+const TOLD_APART = COLOURS * PATTERNS;
 
-/** Hue of the n-th of several things, far from its neighbours'. */
-export function hue(n) {
-  return n < TOLD_APART ? FIRST_HUES[n % FIRST_HUES.length] : (n * GOLDEN_ANGLE) % 360;
+/** The name of the custom property of the n-th of several things. */
+export function colourName(n) {
+  return `--uav-${n % COLOURS}`;
+}
+
+/** The pattern of its line, from 0. */
+export function pattern(n) {
+  return Math.floor(n / COLOURS) % PATTERNS;
 }
 
 /** Give an element the colour of a UAV. @param {HTMLElement | SVGElement} element @param {string} id @param {number} [place] of one that is not on screen */
 export function paint(element, id, place = 0) {
   const n = get().colours[id] ?? place;
-  const round = n < TOLD_APART ? Math.floor(n / FIRST_HUES.length) : 0;
-  element.style.setProperty("--hue", hue(n));
-  element.style.setProperty("--shade", round % 2);
-  element.classList.toggle("dashed", round > 1);
+  element.style.setProperty("--own", `var(${colourName(n)})`);
+  for (let each = 1; each < PATTERNS; each += 1) element.classList.toggle(`pattern-${each}`, pattern(n) === each);
   return element;
 }
 

@@ -1,9 +1,12 @@
 /** Reward against something, a line an algorithm, as the paper's figures have it. */
 
 import uPlot from "../vendor/uplot/uplot.js";
-import { hue } from "./colours.js";
+import { colourName, pattern } from "./colours.js";
 import { h } from "./dom.js";
 import { shown, t } from "./texts.js";
+
+/** Lengths of strokes and gaps of the patterns of lines. */
+const DASHES = [[], [9, 5], [2, 4], [9, 4, 2, 4]];
 
 /**
  * Draw curves into an element, instead of what was there.
@@ -41,7 +44,8 @@ export function drawCurves(root, series, { x, height = 260, label }) {
         { label: x },
         ...drawn.map((each, i) => ({
           label: each.name,
-          stroke: `oklch(${css.getPropertyValue("--route-l")} ${css.getPropertyValue("--route-c")} ${hue(i)})`,
+          stroke: css.getPropertyValue(colourName(i)).trim(),
+          dash: DASHES[pattern(i)],
           width: 2,
           paths: uPlot.paths.stepped({ align: 1 }),
           points: { show: each.points.length < 2 },

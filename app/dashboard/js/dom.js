@@ -2,8 +2,6 @@
 
 import { betweenAmounts, shown, t, tn } from "./texts.js";
 
-export { shown };
-
 /**
  * Make an element.
  * @param {string} tag

@@ -1,11 +1,9 @@
 /** Form fields made from JSON schemas, as the service describes its parameters. */
 
 import { h } from "./dom.js";
+import { NO_LIMIT, TINY } from "./limits.js";
 import { resolved } from "./schema.js";
 import { plainNumber, t, writtenNumber } from "./texts.js";
-
-/** A limit beyond this, or beyond its negative, says nothing to anybody. */
-const NO_LIMIT = 1e9;
 
 /**
  * Fields of an object's schema.
@@ -54,7 +52,7 @@ export function labelled(title, input, { pointer, hint } = {}) {
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }
 
-function makeField(name, schema, { pointer, value, title = t(titleOf(name)), onchange }) {
+function makeField(name, schema, { pointer, value, title = labelOf(name), onchange }) {
   const given = value ?? schema.default;
   const input = inputFor(schema, given);
   input.name = name;
@@ -72,6 +70,16 @@ function forPeople(description) {
 export function titleOf(name) {
   const text = name.replace(/_s$/, ", s").replaceAll("_", " ");
   return text[0].toUpperCase() + text.slice(1);
+}
+
+/** The same in the language of the page. */
+export function labelOf(name) {
+  return t(titleOf(name));
+}
+
+/** A label as it stands in a line. */
+export function inLine(label) {
+  return label[0].toLowerCase() + label.slice(1);
 }
 
 function inputFor(schema, given) {
@@ -102,11 +110,13 @@ function valueOf(schema, input) {
 
 function range({ minimum, maximum, exclusiveMinimum, type }) {
   if (type !== "number" && type !== "integer") return "";
-  const least = minimum ?? exclusiveMinimum;
+  const positive = minimum > 0 && minimum <= TINY;
+  const least = positive ? 0 : (minimum ?? exclusiveMinimum);
+  const beyond = positive || minimum === undefined;
   const low = least < -NO_LIMIT ? undefined : least;
   const endless = maximum === undefined || maximum > NO_LIMIT;
   if (low === undefined && endless) return "";
-  if (endless) return exclusiveMinimum === undefined ? t("At least {low}", { low }) : t("More than {low}", { low });
+  if (endless) return beyond ? t("More than {low}", { low }) : t("At least {low}", { low });
   if (low === undefined) return t("At most {high}", { high: maximum });
-  return exclusiveMinimum === undefined ? t("{low} to {high}", { low, high: maximum }) : t("More than {low} to {high}", { low, high: maximum });
+  return beyond ? t("More than {low} to {high}", { low, high: maximum }) : t("{low} to {high}", { low, high: maximum });
 }

@@ -3,17 +3,37 @@
 import { FormatError } from "./formats/error.js";
 import { fromCsv, toCsv } from "./formats/csv.js";
 import { fromGeoJson, toGeoJson } from "./formats/geojson.js";
+import { sheetOf } from "./formats/places.js";
 import { textOf } from "./formats/text.js";
 import { BASES } from "./kinds.js";
+import { baseName } from "./plan.js";
 import { normalised } from "./problem.js";
 import { itemFields, wanted } from "./schema.js";
+import { t, tn } from "./texts.js";
 
 export { FormatError, toCsv, toGeoJson };
 
-const CALLED = { uavs: "UAV", targets: "area", [BASES]: "base" };
+const CALLED = { uavs: (name) => t("UAV {name}", { name }), targets: (name) => t("area {name}", { name }), [BASES]: baseName };
+const RENAMED = {
+  uavs: (count, ids) => tn(count, "{count} UAV has an id that stood before and was numbered: {ids}", "{count} UAVs have ids that stood before and were numbered: {ids}", { ids }),
+  targets: (count, ids) => tn(count, "{count} area has an id that stood before and was numbered: {ids}", "{count} areas have ids that stood before and were numbered: {ids}", { ids }),
+  [BASES]: (count, ids) => tn(count, "{count} base has an id that stood before and was numbered: {ids}", "{count} bases have ids that stood before and were numbered: {ids}", { ids }),
+};
 
 export function toJson(problem) {
   return `${JSON.stringify(problem, null, 2)}\n`;
+}
+
+/**
+ * Find a list of places in a file.
+ * @param {Uint8Array} bytes
+ * @returns {import("./formats/places.js").Sheet | null} null where it is a problem of any of the formats, or no list
+ * @throws {FormatError}
+ */
+export function readList(bytes) {
+  const { text, notices } = textOf(bytes);
+  const sheet = sheetOf(text);
+  return sheet && { ...sheet, notices: [...notices, ...sheet.notices] };
 }
 
 /**
@@ -36,10 +56,10 @@ function fromJson(text, present, fields) {
   try {
     given = JSON.parse(text);
   } catch (error) {
-    throw new FormatError(`this is no JSON: ${error.message}`);
+    throw new FormatError(t("this is no JSON: {why}", { why: error.message }));
   }
   if (given.type === "FeatureCollection") return fromGeoJson(given, present, fields);
-  if (!Array.isArray(given.uavs) || !Array.isArray(given.targets)) throw new FormatError("it has no lists `uavs` and `targets`, and is no FeatureCollection");
+  if (!Array.isArray(given.uavs) || !Array.isArray(given.targets)) throw new FormatError(t("it has no lists `uavs` and `targets`, and is no FeatureCollection"));
   const problem = Object.fromEntries(Object.entries(given).filter(([name]) => !(name in fields.request)));
   return { problem, notices: [] };
 }
@@ -48,14 +68,14 @@ function fromJson(text, present, fields) {
 function complete(problem, fields, notices) {
   const unknown = new Set();
   const checked = (object, known, what) => {
-    if (!object || typeof object !== "object" || Array.isArray(object)) throw new FormatError(`${what} is no object`);
+    if (!object || typeof object !== "object" || Array.isArray(object)) throw new FormatError(t("{what} is no object", { what }));
     const kept = {};
     for (const [name, value] of Object.entries(object)) {
       if (value === null || value === undefined) continue;
       if (!(name in known)) unknown.add(name);
       else {
         const want = wanted(value, known[name]);
-        if (want) throw new FormatError(`${what}: \`${name}\` is ${JSON.stringify(value)}, ${want} is needed`);
+        if (want) throw new FormatError(t("{what}: `{field}` is {value}, {needed} is needed", { what, field: name, value: JSON.stringify(value), needed: want }));
         kept[name] = known[name].properties ? checked(value, known[name].properties, name) : value;
       }
     }
@@ -65,23 +85,23 @@ function complete(problem, fields, notices) {
     const known = itemFields(fields, kind);
     const found = problem[kind].map((item, at) => {
       const named = typeof item?.id === "number" ? { ...item, id: String(item.id) } : item;
-      const name = `${CALLED[kind]} ${named?.id ?? at + 1}`;
+      const name = CALLED[kind](String(named?.id ?? at + 1));
       const kept = checked(named, known, name);
       const missing = Object.keys(known).find((field) => known[field].needed && !(field in kept));
-      if (missing) throw new FormatError(`${name} has no \`${missing}\``);
+      if (missing) throw new FormatError(t("{what} has no `{field}`", { what: name, field: missing }));
       return kept;
     });
-    return distinct(found, CALLED[kind], known.id.maxLength, notices);
+    return distinct(found, kind, known.id.maxLength, notices);
   };
   const { uavs, targets, ...settings } = problem;
-  const whole = { ...checked(settings, fields.settings, "the problem"), uavs: items("uavs"), targets: items("targets") };
+  const whole = { ...checked(settings, fields.settings, t("the problem")), uavs: items("uavs"), targets: items("targets") };
   if (whole[BASES]) whole[BASES] = items(BASES);
-  if (unknown.size) notices.push(`Fields that the service does not know were left out: ${[...unknown].join(", ")}`);
+  if (unknown.size) notices.push(t("Fields that the service does not know were left out: {fields}", { fields: [...unknown].join(", ") }));
   return normalised(whole);
 }
 
-/** Number ids that are there before, as ids have to differ. */
-function distinct(items, what, longest, notices) {
+/** Number ids that are there before, as ids have to differ. @param {"uavs"|"targets"|"bases"} kind of the items */
+export function distinct(items, kind, longest, notices) {
   const taken = new Set(items.map(({ id }) => id));
   const seen = new Set();
   const renamed = [];
@@ -101,7 +121,6 @@ function distinct(items, what, longest, notices) {
     renamed.push(other);
     return { ...item, id: other };
   });
-  const [first, ...rest] = renamed;
-  if (first) notices.push(`${renamed.length} ${what}${rest.length ? "s have ids" : " has an id"} that stood before and ${rest.length ? "were" : "was"} numbered: ${renamed.slice(0, 5).join(", ")}${renamed.length > 5 ? " …" : ""}`);
+  if (renamed.length) notices.push(RENAMED[kind](renamed.length, `${renamed.slice(0, 5).join(", ")}${renamed.length > 5 ? " …" : ""}`));
   return numbered;
 }

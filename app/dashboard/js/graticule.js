@@ -1,7 +1,8 @@
 /** Lines of round coordinates with their numbers: a map without a background keeps its bearings. */
 
 import { DomUtil, Layer } from "../vendor/leaflet/leaflet.js";
-import { shown, svg } from "./dom.js";
+import { svg } from "./dom.js";
+import { shown } from "./texts.js";
 
 const APART_PX = 110;
 

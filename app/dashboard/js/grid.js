@@ -1,7 +1,7 @@
 /** An editable table that is used from the keyboard like a spreadsheet. */
 
-import { h, shown } from "./dom.js";
-import { plainNumber, t, writtenNumber } from "./texts.js";
+import { h } from "./dom.js";
+import { plainNumber, shown, t, writtenNumber } from "./texts.js";
 
 /** With more rows than this only those near the ones in sight are there. */
 const WINDOW = 240;

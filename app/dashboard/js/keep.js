@@ -13,7 +13,7 @@ import { get, subscribe } from "./state.js";
 const DATABASE = "dispatch";
 const VERSION = 1;
 const TAB = "dispatch-mission";
-const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "draft", "colours", "job", "past", "future"];
+const KEPT_KEYS = ["problem", "problemName", "answer", "answerProblem", "draft", "colours", "begins", "job", "past", "future"];
 const STEPS_KEPT = 20;
 const PROBLEMS_KEPT = 20;
 const REST_MS = 200;
@@ -187,10 +187,10 @@ async function put(state) {
   seen.onsuccess = () => {
     written = !seen.result || seen.result.page === page;
     if (!written) return;
-    const { problem, problemName, answer, job, past, future } = state;
+    const { problem, problemName, answer, begins, job, past, future } = state;
     const savedAt = Date.now();
     const steps = { past: past.slice(-STEPS_KEPT), future: future.slice(0, STEPS_KEPT) };
-    store.put({ id, page, savedAt, state: { ...present(), job, ...steps } });
+    store.put({ id, page, savedAt, state: { ...present(), begins, job, ...steps } });
     transaction.objectStore("labels").put({ id, savedAt, name: problemName, uavs: problem.uavs.length, areas: problem.targets.length, reward: answer?.reward ?? null });
   };
   await finished(transaction);

@@ -7,6 +7,7 @@ import { keepColours } from "./colours.js";
 import { h, notify } from "./dom.js";
 import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
+import { watchIntake } from "./intake.js";
 import { keepProblem, restore } from "./keep.js";
 import { languageChoice } from "./language.js";
 import { DispatchMap } from "./map.js";
@@ -20,7 +21,7 @@ import { fieldsOf } from "./schema.js";
 import { sizeText } from "./sizes.js";
 import { get, set, subscribe } from "./state.js";
 import { t } from "./texts.js";
-import { allocateNow } from "./views/allocate.js";
+import { planNow } from "./views/allocate.js";
 import "./views/index.js";
 
 const FIRST_EXAMPLE = "cyclone-idai";
@@ -133,8 +134,7 @@ function onKeys(event) {
     if (map.drawing && !event.shiftKey) map.drawing.takeBack();
     else (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
-    set({ view: "allocate" });
-    allocateNow();
+    planNow();
   } else if (event.key === "Escape" && !typing) {
     map.stopPlacing();
     set({ selection: null });
@@ -211,6 +211,7 @@ async function start() {
   keepColours();
   judgeDrafts();
   keepUntold();
+  watchIntake();
   set({ settings: await json("dashboard/settings.json").catch(() => get().settings) });
   map = new DispatchMap(byId("map"));
   makeTabs();

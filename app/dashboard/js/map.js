@@ -2,15 +2,16 @@
 
 import * as L from "../vendor/leaflet/leaflet.js";
 import { Air } from "./air.js";
+import { addBackground } from "./background.js";
 import { Graticule } from "./graticule.js";
-import { h, shortAmounts, shown } from "./dom.js";
+import { bringIntoSight } from "./into_sight.js";
 import { BASES, ZONES } from "./kinds.js";
-import { stockText } from "./bases.js";
-import { called, met, rangeLeft, rangeShare, stateOf, urgency } from "./plan.js";
-import { addZone, extent, fewestCorners, move, place, position, remove, requestedBy, update } from "./problem.js";
+import { Labels } from "./labels.js";
+import { addControls } from "./legend.js";
+import { Markers, STARTS } from "./markers.js";
+import { addZone, extent, fewestCorners, move, moveStarts, place, position, remove, update } from "./problem.js";
 import { Routes } from "./routes.js";
 import { get, select, subscribe } from "./state.js";
-import { areaDot, areaSymbol, aside, depotSymbol, uavDot, uavSymbol } from "./symbols.js";
 import { ZoneCorners } from "./zone_corners.js";
 import { ZoneDrawing } from "./zone_drawing.js";
 
@@ -18,8 +19,6 @@ const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 
 /** The view in which symbols can be moved and deleted. */
 const EDITED_IN = "problem";
-const MANY = 150;
-const DOTS_FROM = 600;
 const SLOW_MS = 250;
 const NUDGE_PX = 5;
 const NUDGES = { ArrowUp: [0, -NUDGE_PX], ArrowDown: [0, NUDGE_PX], ArrowLeft: [-NUDGE_PX, 0], ArrowRight: [NUDGE_PX, 0] };
@@ -35,12 +34,12 @@ export class DispatchMap {
     this.fitting = false;
     this.placing = null;
     this.drawing = null;
-    this.symbols = new Map();
     this.later = null;
     this.shift = 0;
     subscribe(["problem"], ({ problem }) => this.#onProblem(problem));
     subscribe(["answer", "incumbent", "answerProblem"], (_, changed) => (changed.includes("answer") ? this.#draw() : this.#drawSoon()));
-    subscribe(["selection"], () => this.#markSelection());
+    subscribe(["selection"], () => this.#onSelection());
+    subscribe(["begins"], () => this.#draw());
     subscribe(["view"], () => this.#onView());
     new ResizeObserver(() => this.resized()).observe(element);
     element.addEventListener("keydown", (event) => this.#onKey(event));
@@ -87,6 +86,8 @@ export class DispatchMap {
 
   /** Bring everything into sight. */
   fit() {
+    // A zoom that is under way would take the map elsewhere at its end.
+    if (this.map._animatingZoom) return this.map.once("zoomend", () => this.fit());
     this.handled = false;
     this.fitting = true;
     this.#fitBox(this.#extent(this.#shown().problem));
@@ -144,14 +145,9 @@ export class DispatchMap {
       crs: globe ? L.CRS.EPSG3857 : L.CRS.Simple,
       minZoom: globe ? 1 : -32, maxZoom: globe ? 20 : 32, zoomSnap: 0.25, zoomDelta: 0.5,
       zoomAnimation: !CALM.matches, markerZoomAnimation: !CALM.matches, inertia: !CALM.matches,
-      attributionControl: Boolean(globe && settings.tile_url), fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
+      attributionControl: false, zoomControl: false, fadeAnimation: false, renderer: L.svg({ padding: 0.5 }),
     });
-    this.map.attributionControl?.setPrefix(false);
-    if (globe && settings.tile_url) {
-      const attribution = document.createElement("span");
-      attribution.textContent = settings.tile_attribution;
-      L.tileLayer(settings.tile_url, { attribution: attribution.innerHTML, maxZoom: 20 }).addTo(this.map);
-    }
+    if (globe) addBackground(this.map, settings);
     new Graticule(globe).addTo(this.map);
     if (globe) L.control.scale({ imperial: false }).addTo(this.map);
     this.air = new Air(this.map, globe, (event, id) => this.#onZone(event, id));
@@ -161,8 +157,12 @@ export class DispatchMap {
       changed: (id, polygon) => update(ZONES, id, { polygon }),
     });
     this.routes = new Routes(this.map);
-    this.markers = L.layerGroup().addTo(this.map);
-    this.symbols.clear();
+    this.markers = new Markers(this.map, {
+      latLng: (point) => this.#latLng(point), editable: () => this.#editable(), busy: () => Boolean(this.placing || this.drawing),
+      moved: (kind, id, latlng) => this.#moveTo(kind, id, latlng),
+    });
+    this.labels = new Labels(this.map, this.markers, this.routes);
+    addControls(this.map, () => this.fit());
     this.map.on("movestart zoomstart", () => { this.handled ||= !this.fitting; });
     this.map.on("click", ({ latlng, originalEvent }) => this.#onClick(latlng, originalEvent));
     this.map.on("dblclick", () => this.drawing?.finish());
@@ -191,14 +191,7 @@ export class DispatchMap {
     }
     this.air.draw(problem, (point) => this.#latLng(point), this.shift);
     const answer = plan && !Array.isArray(plan) && planned === problem ? plan : null;
-    this.before = this.symbols;
-    this.symbols = new Map();
-    this.dots = problem.targets.length + problem.uavs.length > DOTS_FROM;
-    this.#drawAreas(problem, answer);
-    this.#drawDepots(problem, answer);
-    this.#drawUavs(problem);
-    for (const { marker, base } of this.before.values()) for (const layer of [marker, base]) if (layer) this.markers.removeLayer(layer);
-    this.before = null;
+    this.markers.draw(problem, answer);
     this.#markSelection();
     this.took = performance.now() - began;
   }
@@ -209,123 +202,45 @@ export class DispatchMap {
     this.later ??= setTimeout(() => this.#draw(), Math.max(SLOW_MS, 4 * this.took));
   }
 
-  #drawAreas(problem, answer) {
-    const highest = Math.max(0, ...problem.targets.map((target) => target.level));
-    const size = this.dots ? 10 : problem.targets.length > MANY ? 15 : 24;
-    const share = met(problem, answer);
-    for (const target of problem.targets) {
-      const looks = { urgent: urgency(target.level, highest), met: share.get(target.id), size };
-      const says = () => {
-        const lines = [`${called(target)} · urgency ${shown(target.level)}`, `needs ${shortAmounts(target.loadlist)}${target.requested ? ` of ${shortAmounts(requestedBy(target))}` : ""}`];
-        if (answer) lines.push(`${shown(100 * looks.met, 3)}% met`);
-        if (target.earliest) lines.push(`from ${shown(target.earliest)}`);
-        if (target.deadline !== undefined) lines.push(`by ${shown(target.deadline)}`);
-        return lines.join("\n");
-      };
-      this.#addSymbol("targets", target, target, () => (this.dots ? areaDot : areaSymbol)(looks), [0, 0], looks, says);
-    }
-  }
-
-  #drawDepots(problem, answer) {
-    const left = new Map((answer?.bases ?? []).map(({ base_id: id, stock }) => [id, stock]));
-    for (const base of problem[BASES] ?? []) {
-      const says = () => {
-        const lines = [`${called(base)} · base`, `stock ${stockText(base.stock)}`];
-        if (left.has(base.id)) lines.push(`after the plan ${stockText(left.get(base.id))}`);
-        if (base.turnaround) lines.push(`turnaround ${shown(base.turnaround)}`);
-        return lines.join("\n");
-      };
-      const looks = { size: 34, name: called(base), stock: stockText(base.stock) };
-      this.#addSymbol(BASES, base, base, () => depotSymbol(looks), [0, 0], looks, says);
-    }
-  }
-
-  #drawUavs(problem) {
-    const size = this.dots ? 10 : problem.uavs.length > 40 ? 12 : 17;
-    const crowds = new Map();
-    const { colours } = get();
-    for (const uav of problem.uavs) {
-      const at = position(uav);
-      const spot = `${at.x} ${at.y}`;
-      const nth = crowds.get(spot) ?? 0;
-      crowds.set(spot, nth + 1);
-      const says = () => `${called(uav)} · ${stateOf(uav)}\nrange left ${shown(rangeLeft(uav))} of ${shown(uav.voyage)}\ncarries ${shortAmounts(uav.loadlist)}`;
-      this.#addSymbol("uavs", uav, at, () => (this.dots ? uavDot : uavSymbol)(uav, size), aside(nth, size), { colour: colours[uav.id], size, nth, ret: uav.ret, left: rangeShare(uav).toFixed(3) }, says);
-    }
-  }
-
-  /** Draw a symbol, or keep the one that shows the same. */
-  #addSymbol(kind, item, at, draw, [dx, dy], looks, says) {
-    const { id } = item;
-    const { size } = looks;
-    const key = `${kind} ${id}`;
-    const look = JSON.stringify([looks, this.dots]);
-    const known = this.before.get(key);
-    if (known?.look === look) {
-      this.before.delete(key);
-      this.symbols.set(key, known);
-      known.says = says;
-      const { lat, lng } = known.marker.getLatLng();
-      const [y, x] = this.#latLng(at);
-      if (lat !== y || lng !== x) known.marker.setLatLng([y, x]);
-      if (known.base) this.markers.removeLayer(known.base);
-      known.base = this.#drawBase(kind, item, at);
-      this.#allowMoving(known);
-      return;
-    }
-    const drawn = { look, says };
-    const icon = L.divIcon({ className: `symbol ${kind}`, html: draw(), iconSize: [size, size], iconAnchor: [size / 2 - dx, size / 2 - dy] });
-    const marker = L.marker(this.#latLng(at), { icon, keyboard: false, riseOnHover: !this.dots });
-    marker.on("click", () => select({ kind, id }));
-    marker.on("dragend", () => this.#moveTo(kind, id, marker.getLatLng()));
-    marker.bindTooltip(() => h("span", {}, drawn.says()), { direction: "top", offset: [dx, dy - size / 2], className: "tip" });
-    this.markers.addLayer(marker);
-    const element = marker.getElement();
-    Object.assign(element.dataset, { kind, id });
-    this.symbols.set(key, Object.assign(drawn, { marker, element, base: this.#drawBase(kind, item, at) }));
-    if (this.dots) marker.on("mouseover", () => this.#allowMoving(drawn, true));
-    this.#allowMoving(drawn);
-  }
-
   /** Whether what is drawn can be changed here: the problem in its own view; elsewhere a plan is looked at. */
   #editable() {
     return !this.given && get().view === EDITED_IN;
   }
 
-  /** Let a symbol be dragged, where it can be changed; of very many only the one under the pointer. */
-  #allowMoving({ marker }, asked = !this.dots) {
-    if (!this.#editable()) marker.dragging.disable();
-    else if (asked) marker.dragging.enable();
-  }
-
-  /** The starting point of a UAV that is elsewhere. */
-  #drawBase(kind, item, at) {
-    if (kind !== "uavs" || (at.x === item.x_s && at.y === item.y_s)) return null;
-    const icon = L.divIcon({ className: "base", iconSize: [9, 9] });
-    const base = L.marker(this.#latLng({ x: item.x_s, y: item.y_s }), { icon, interactive: false, keyboard: false });
-    this.markers.addLayer(base);
-    return base;
-  }
-
   #onView() {
     this.stopPlacing();
-    for (const symbol of this.symbols.values()) this.#allowMoving(symbol);
+    this.markers?.allowMoving();
     this.#markSelection();
+  }
+
+  #onSelection() {
+    if (!this.map) return;
+    if (this.routes.marksFollowSelection) this.routes.drawMarks();
+    this.#markSelection();
+    this.#bringIntoSight();
+  }
+
+  /** Move the map where nothing of what is selected is in sight. */
+  #bringIntoSight() {
+    const { selection } = get();
+    if (!selection || this.placing || this.drawing) return;
+    const item = this.#shown().problem[selection.kind]?.find(({ id }) => id === selection.id);
+    if (!item) return;
+    const spots = item.polygon ? [...item.polygon, item.polygon[0]].map(([x, y]) => ({ x, y })) : [selection.kind === "uavs" ? position(item) : item];
+    const ways = selection.kind === "uavs" ? this.routes.waysOf(item.id) : [];
+    bringIntoSight(this.map, [spots.map((spot) => this.#latLng(spot)), ...ways], !CALM.matches);
   }
 
   #markSelection() {
     const { selection } = get();
+    if (!this.map) return;
     this.#markZone(selection?.kind === ZONES ? selection.id : null);
-    for (const [key, { marker, element }] of this.symbols) {
-      const chosen = selection !== null && key === `${selection.kind} ${selection.id}`;
-      if (element.classList.contains("selected") === chosen) continue;
-      element.classList.toggle("selected", chosen);
-      marker.setZIndexOffset(chosen ? 1000 : 0);
-    }
+    this.markers.mark();
     this.element.classList.toggle("one-route", selection?.kind === "uavs");
-    for (const drawn of this.element.querySelectorAll("path.route, .order")) {
+    for (const drawn of this.element.querySelectorAll("path.route, .order, .arrow")) {
       drawn.classList.toggle("selected", selection?.kind === "uavs" && drawn.dataset.uavId === selection.id);
     }
+    this.labels.soon();
   }
 
   #markZone(id) {
@@ -348,6 +263,7 @@ export class DispatchMap {
   }
 
   #moveTo(kind, id, latlng) {
+    if (kind === STARTS) return moveStarts(id, this.#rounded(latlng));
     move(kind, id, this.#rounded(latlng));
     select({ kind, id });
   }
@@ -373,6 +289,7 @@ export class DispatchMap {
       event.preventDefault(); // a form that opens then is not sent by the same key
       return this.#onClick(this.map.getCenter());
     }
+    if (event.key.toLowerCase() === "f" && !event.ctrlKey && !event.metaKey && !event.altKey) return this.fit();
     const { selection } = get();
     if (!selection || !this.#editable() || this.drawing) return;
     if (event.key === "Delete") remove(selection.kind, selection.id);
@@ -380,7 +297,7 @@ export class DispatchMap {
       event.preventDefault();
       event.stopPropagation();
       if (selection.kind === ZONES) return this.corners.move(NUDGES[event.key]);
-      const { marker } = this.symbols.get(`${selection.kind} ${selection.id}`);
+      const { marker } = this.markers.of(selection);
       const to = this.map.latLngToLayerPoint(marker.getLatLng()).add(NUDGES[event.key]);
       this.#moveTo(selection.kind, selection.id, this.map.layerPointToLatLng(to));
     }

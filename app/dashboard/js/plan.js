@@ -111,11 +111,18 @@ export function met(problem, answer) {
   );
 }
 
-/** What a UAV is doing, in a word. */
+/** What a UAV is doing: `returning`, `in the air` or `at its base`. */
 export function stateOf(uav) {
   if (uav.ret) return "returning";
   const now = position(uav);
   return (uav.dis ?? 0) > 0 || now.x !== uav.x_s || now.y !== uav.y_s ? "in the air" : "at its base";
+}
+
+const STATES = { returning: t("returning"), "in the air": t("in the air"), "at its base": t("at its base") };
+
+/** The same in words. */
+export function stateText(uav) {
+  return STATES[stateOf(uav)];
 }
 
 /** Range left of a UAV as the problem has it. */

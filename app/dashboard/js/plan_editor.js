@@ -1,7 +1,7 @@
 /** The routes of a plan while they are changed by hand: visits moved, added and removed, by buttons or by dragging. */
 
 import { paint } from "./colours.js";
-import { h, notify, number, shown } from "./dom.js";
+import { h, notify, number } from "./dom.js";
 import { saidOfBreach, withMoved, withVisit, withoutBroken, withoutVisit } from "./draft.js";
 import { beginWith, changeDraft, dropDraft, judgeAgain, keepDraft } from "./drafting.js";
 import { lockedCount } from "./locks.js";
@@ -9,7 +9,8 @@ import { called, placeNames } from "./plan.js";
 import { Portions } from "./portions.js";
 import { get, select, set } from "./state.js";
 import { baseOf, placesOf } from "./stops.js";
-import { t, tn, tNodes } from "./texts.js";
+import { shown, t, tn, tNodes } from "./texts.js";
+import { moment } from "./units.js";
 
 /** What the service says of the draft, and what can become of it. */
 export function judgement(problem, answer, draft) {
@@ -66,7 +67,7 @@ export class PlanEditor {
     for (const row of this.body.querySelectorAll("tr[data-at]")) {
       const { uavId, at } = row.dataset;
       row.classList.toggle("broken", broken.has(`${uavId}\n${at}`));
-      row.querySelector(".num").replaceChildren(broken.has(`${uavId}\n${at}`) ? h("span", { class: "error" }, t("not allowed")) : number(arrivals.get(uavId)?.[at]));
+      row.querySelector(".num").replaceChildren(broken.has(`${uavId}\n${at}`) ? h("span", { class: "error" }, t("not allowed")) : moment(this.problem, arrivals.get(uavId)?.[at]));
     }
   }
 

@@ -1,6 +1,7 @@
 /** The problem on screen: making, editing, undoing. All of it in the API's own fields. */
 
 import { notify } from "./dom.js";
+import { TYPES } from "./fleet_types.js";
 import { change } from "./history.js";
 import { BASES, STEMS, ZONES } from "./kinds.js";
 import { withAdded, withRemoved, withRenamed } from "./references.js";
@@ -15,7 +16,7 @@ export function normalised({ uavs = [], targets = [], ...settings }) {
 }
 
 /** Items with ids: the service's own by place in the list, or the next that is free. */
-function named(items, stem) {
+export function named(items, stem) {
   const taken = new Set(items.map(({ id }) => id));
   return items.map((item, at) => {
     const fields = present(item);
@@ -85,28 +86,29 @@ export function move(kind, id, { x, y }) {
   return update(kind, id, uav.x_c === undefined && uav.y_c === undefined ? { x_s: x, y_s: y } : { x_c: x, y_c: y });
 }
 
-/** Place a new UAV, area or base; it resembles the last of its kind. */
-export function place(kind, { x, y }) {
-  const { problem } = get();
-  if (kind === BASES) return addBase(x, y);
-  const last = problem[kind].at(-1);
-  const id = freeId(kind, problem[kind]);
-  const loadlist = last ? [...last.loadlist] : new Array(materials(problem)).fill(kind === "uavs" ? 10 : 5);
-  const item =
-    kind === "uavs"
-      ? { id, x_s: x, y_s: y, speed: last?.speed ?? 1, voyage: last?.voyage ?? reach(problem), loadlist }
-      : { id, x, y, level: last?.level ?? 1, loadlist };
-  edit((now) => withAdded(now, kind, item));
-  select({ kind, id });
+/** Move UAVs that wait at one place to another, all together. @param {string[]} ids */
+export function moveStarts(ids, { x, y }) {
+  const moved = new Set(ids);
+  edit((problem) => ({ uavs: problem.uavs.map((uav) => (moved.has(uav.id) ? { ...uav, x_s: x, y_s: y, ...(uav.x_c === undefined ? {} : { x_c: x }), ...(uav.y_c === undefined ? {} : { y_c: y }) } : uav)) }));
 }
 
-/** Add a base with as much as is asked for, and select it. */
-function addBase(x, y) {
-  const bases = get().problem[BASES] ?? [];
-  const { turnaround } = bases.at(-1) ?? {};
-  const base = { id: freeId(BASES, bases), x, y, ...(turnaround === undefined ? {} : { turnaround }) };
-  edit(() => ({ [BASES]: [...bases, base] }));
-  select({ kind: BASES, id: base.id });
+/** What a new UAV, area or base has besides its place: it resembles the last of its kind. The first UAV on the globe is of the first type. */
+export function newItem(kind, problem) {
+  const last = problem[kind]?.at(-1);
+  if (kind === BASES) return last?.turnaround === undefined ? {} : { turnaround: last.turnaround };
+  const amounts = (first) => (last ? [...last.loadlist] : new Array(materials(problem)).fill(first));
+  if (kind !== "uavs") return { level: last?.level ?? 1, loadlist: amounts(5) };
+  const first = problem.crs === "wgs84" ? TYPES[0] : { speed: 1, voyage: reach(problem), load: 10 };
+  return { speed: last?.speed ?? first.speed, voyage: last?.voyage ?? first.voyage, loadlist: amounts(first.load) };
+}
+
+/** Place a new UAV, area or base, and select it. */
+export function place(kind, { x, y }) {
+  const { problem } = get();
+  const id = freeId(kind, problem[kind] ?? []);
+  const item = { id, ...(kind === "uavs" ? { x_s: x, y_s: y } : { x, y }), ...newItem(kind, problem) };
+  edit((now) => (kind === BASES ? { [BASES]: [...(now[BASES] ?? []), item] } : withAdded(now, kind, item)));
+  select({ kind, id });
 }
 
 /** Add a zone, and select it. @param {number[][]} polygon its corners */
@@ -137,26 +139,29 @@ export function freeId(kind, items) {
   return `${STEMS[kind]}-${n}`;
 }
 
-/** A range that a first UAV is given: three times across the areas, or as far as a plain number goes. */
+/** A range that a first UAV on a plane is given: three times across the areas. */
 function reach(problem) {
   const box = extent(problem);
-  if (problem.crs === "wgs84") return 100;
   return box ? 3 * Math.hypot(box.maxX - box.minX, box.maxY - box.minY) || 3 : 3;
 }
 
 /** Give every UAV, area and base so many kinds of material. */
 export function setMaterials(count) {
-  const { fields } = get();
+  edit((problem) => withMaterials(problem, get().fields, count));
+}
+
+/** A problem with so many kinds of material; amounts of those that come are 0. */
+export function withMaterials(problem, fields, count) {
   const fitted = (kind, items) => {
     const names = amountsOf(itemFields(fields, kind));
     const amounts = (list) => Array.from({ length: count }, (_, k) => list[k] ?? 0);
     return items.map((item) => ({ ...item, ...Object.fromEntries(names.filter((name) => item[name]).map((name) => [name, amounts(item[name])])) }));
   };
-  edit((problem) => ({
-    uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets),
+  return {
+    ...problem, uavs: fitted("uavs", problem.uavs), targets: fitted("targets", problem.targets),
     ...(problem[BASES]?.length ? { [BASES]: fitted(BASES, problem[BASES]) } : {}),
     ...(problem.materials?.length ? { materials: Array.from({ length: count }, (_, k) => problem.materials[k] ?? {}) } : {}),
-  }));
+  };
 }
 
 /** What an area asked for at first, an amount a material. */

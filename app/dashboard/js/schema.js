@@ -1,5 +1,7 @@
 /** What the service says of a problem's fields in `/openapi.json`: the page has no list of its own. */
 
+import { t } from "./texts.js";
+
 /** Take out references and the null of what may be left open. */
 export function resolved(schema, defs) {
   const found = schema.$ref ? { ...defs[schema.$ref.split("/").at(-1)], ...schema } : schema;
@@ -66,14 +68,14 @@ export function amountsOf(fields) {
 
 /** What a value has to be, where it is not that; null where it is. */
 export function wanted(value, schema) {
-  if (schema.enum) return schema.enum.includes(value) ? null : `one of ${schema.enum.join(", ")}`;
+  if (schema.enum) return schema.enum.includes(value) ? null : t("one of {values}", { values: schema.enum.join(", ") });
   if (schema.const !== undefined) return value === schema.const ? null : String(schema.const);
-  if (schema.type === "number" || schema.type === "integer") return Number.isFinite(value) ? null : "a number";
-  if (schema.type === "boolean") return typeof value === "boolean" ? null : "true or false";
-  if (schema.type === "string") return typeof value === "string" ? null : "a text";
-  if (isAmounts(schema)) return Array.isArray(value) && value.every(Number.isFinite) ? null : "a list of numbers";
-  if (isWords(schema)) return Array.isArray(value) && value.every((word) => typeof word === "string") ? null : "a list of texts";
-  if (schema.type === "array") return Array.isArray(value) ? null : "a list";
-  if (schema.type === "object") return value && typeof value === "object" && !Array.isArray(value) ? null : "an object";
+  if (schema.type === "number" || schema.type === "integer") return Number.isFinite(value) ? null : t("a number");
+  if (schema.type === "boolean") return typeof value === "boolean" ? null : t("true or false");
+  if (schema.type === "string") return typeof value === "string" ? null : t("a text");
+  if (isAmounts(schema)) return Array.isArray(value) && value.every(Number.isFinite) ? null : t("a list of numbers");
+  if (isWords(schema)) return Array.isArray(value) && value.every((word) => typeof word === "string") ? null : t("a list of texts");
+  if (schema.type === "array") return Array.isArray(value) ? null : t("a list");
+  if (schema.type === "object") return value && typeof value === "object" && !Array.isArray(value) ? null : t("an object");
   return null;
 }

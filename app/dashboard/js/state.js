@@ -10,6 +10,7 @@ let state = Object.freeze({
   problem: null,
   problemName: "",
   opened: "",
+  begins: null,
   colours: {},
   past: [],
   future: [],
@@ -24,7 +25,7 @@ let state = Object.freeze({
   selection: null,
   algorithms: [],
   fields: null,
-  settings: { version: "", tile_url: null, tile_attribution: "" },
+  settings: { version: "", tile_url: null, tile_attribution: "", overlay: null },
   view: "problem",
 });
 

@@ -5,7 +5,7 @@ import { h, svg } from "./dom.js";
 import { rangeShare } from "./plan.js";
 
 /**
- * Draw an area: a disc in the colour of its urgency, a ring that fills with what is met.
+ * Draw an area: a disc in the colour of its urgency, larger the more urgent it is, a ring that fills with what is met.
  * @param {{urgent: number, met: number, size: number}} facts urgency class 1 to 5, share met, size in pixels
  */
 export function areaSymbol({ urgent, met, size }) {
@@ -16,7 +16,7 @@ export function areaSymbol({ urgent, met, size }) {
     "stroke-dasharray": `${(met * around).toFixed(2)} ${around.toFixed(2)}`,
   });
   const drawn = svg("svg", { viewBox: `0 0 ${size} ${size}`, width: size, height: size, class: `area urgent-${urgent}` });
-  drawn.append(svg("circle", { class: "need", cx: size / 2, cy: size / 2, r }), svg("circle", { class: "disc", cx: size / 2, cy: size / 2, r: r * 0.55 }));
+  drawn.append(svg("circle", { class: "need", cx: size / 2, cy: size / 2, r }), svg("circle", { class: "disc", cx: size / 2, cy: size / 2, r: r * (0.3 + 0.08 * urgent) }));
   if (met > 0) drawn.append(ring);
   return drawn;
 }
@@ -26,11 +26,23 @@ export function areaDot({ urgent, met }) {
   return h("i", { class: `dot urgent-${urgent}${met >= 1 ? " met" : ""}` });
 }
 
-/** Draw a base: a house, with its name and stock beside it. */
-export function depotSymbol({ size, name, stock }) {
+/** How many UAVs wait at a place, in a corner of its symbol; nothing where none does. */
+function badge(count) {
+  return count ? h("span", { class: "count" }, String(count)) : null;
+}
+
+/** Draw a base: a house, with the number of UAVs that wait there. */
+export function depotSymbol({ size, count }) {
   const drawn = svg("svg", { viewBox: "0 0 24 24", width: size, height: size, class: "depot" });
   drawn.append(svg("path", { d: "M2 11 12 3l10 8v11H2z" }), svg("path", { class: "door", d: "M8 22v-7h8v7z" }));
-  return h("div", {}, drawn, h("span", { class: "depot-name" }, name, h("small", {}, stock)));
+  return h("div", {}, drawn, badge(count));
+}
+
+/** Draw a place where UAVs wait: a rotor cross on a disc, with their number. */
+export function startSymbol({ size, count }) {
+  const drawn = svg("svg", { viewBox: "0 0 24 24", width: size, height: size, class: "start" });
+  drawn.append(svg("circle", { cx: 12, cy: 12, r: 10.5 }), svg("path", { d: "M8 8 16 16M16 8 8 16" }), ...[[8, 8], [16, 8], [8, 16], [16, 16]].map(([cx, cy]) => svg("circle", { class: "rotor", cx, cy, r: 2.4 })));
+  return h("div", {}, drawn, badge(count));
 }
 
 /** Draw a UAV among very many: a square in its colour, hollow where it is returning. */

@@ -35,7 +35,7 @@ _DIVES, _DIVES_UNLIMITED = 8, 3
 """Further dives, at most, once routes are chosen; likewise."""
 
 _LABELS_UNLIMITED = 50_000
-"""Labels that a combination may ask for routes with where no time limit keeps it short: some tenths of a second."""
+"""Labels that a combination asks for routes with where no time limit keeps it short; tenths of a second."""
 
 _OFTEN = 0.3
 """Share of the time so far up to which routes are combined whenever the pool is half full."""

@@ -1,5 +1,6 @@
 /** Cells of a CSV file (RFC 4180, and what programs write instead) and their numbers and texts. */
 
+import { t } from "../texts.js";
 import { FormatError } from "./error.js";
 
 /** Separators that are looked for, in this order. */
@@ -7,7 +8,12 @@ const SEPARATORS = [",", ";", "\t", "|"];
 /** What a spreadsheet takes for a formula; such a text gets an apostrophe in front, and one more where it has some. */
 const FORMULA = /^'*[=+\-@\t\r]/;
 const ESCAPED = /^'+[=+\-@\t\r]/;
-const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+export const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
+
+/** What a row of a file is called. @param {"line"|"feature"} row @param {number} number of it, from 1 */
+export function rowText(row, number) {
+  return row === "feature" ? t("feature {number}", { number: String(number) }) : t("line {number}", { number: String(number) });
+}
 
 /** Write rows of values; texts are kept from becoming formulas. @param {(string | number | boolean)[][]} rows */
 export function toCells(rows) {
@@ -34,23 +40,61 @@ export function plainText(text) {
  * @throws {FormatError}
  */
 export function table(text, needed) {
-  const told = /^\s*"?sep=(.)"?[ \t]*(\r\n|\n|\r)/i.exec(text);
-  const body = told ? text.slice(told[0].length) : text;
-  const before = told ? told[0].split(/\r\n|\n|\r/).length - 1 : 0;
-  const separator = told ? told[1] : separatorOf(body, needed);
-  const [head, ...rows] = [...rowsOf(body, separator, before)].filter(({ cells }) => cells.some((cell) => cell.trim()));
-  if (!head) throw new FormatError("it is empty");
+  const { separator: told, body, before } = toldSeparator(text);
+  const separator = told ?? separatorOf(body, needed);
+  const [head, ...rows] = filled(rowsOf(body, separator, before));
+  if (!head) throw new FormatError(t("it is empty"));
   const columns = head.cells.map((name) => name.trim().toLowerCase());
   if (!columns.includes(needed)) {
     const names = columns.filter(Boolean).slice(0, 8).join(", ");
-    throw new FormatError(`line ${head.line}: it has to name the columns, and \`${needed}\` is not among them (found: ${names})`);
+    throw new FormatError(t("{row}: it has to name the columns, and `{column}` is not among them (found: {names})", { row: rowText("line", head.line), column: needed, names }));
   }
   const twice = columns.find((name, at) => name && columns.indexOf(name) !== at);
-  if (twice) throw new FormatError(`line ${head.line}: two columns are named \`${twice}\``);
+  if (twice) throw new FormatError(t("{row}: two columns are named `{column}`", { row: rowText("line", head.line), column: twice }));
   for (const { line, cells } of rows) {
-    if (cells.slice(columns.length).some((cell) => cell.trim())) throw new FormatError(`line ${line}: it has ${cells.length} cells for ${columns.length} columns`);
+    if (cells.slice(columns.length).some((cell) => cell.trim())) throw new FormatError(t("{row}: it has {cells} cells for {columns} columns", { row: rowText("line", line), cells: cells.length, columns: columns.length }));
   }
   return { separator, columns, rows: rows.filter(({ cells }) => !isTags(cells)) };
+}
+
+/** Separators of a list whose columns have no names that are known: a comma may be one of decimals. */
+const LIST_SEPARATORS = ["\t", ";", "|", ","];
+const LOOKED_AT = 50;
+
+/**
+ * Rows of a list of whatever columns.
+ * @param {string} text
+ * @returns {{separator: string, rows: {line: number, cells: string[]}[]}} without blank rows and a row of HXL tags
+ * @throws {FormatError} where a quote is out of place
+ */
+export function list(text) {
+  const told = toldSeparator(text);
+  const separator = told.separator ?? LIST_SEPARATORS.map((each) => ({ each, evenness: evenness(told.body, each) })).reduce((a, b) => (b.evenness > a.evenness ? b : a)).each;
+  return { separator, rows: filled(rowsOf(told.body, separator, told.before)).filter(({ cells }) => !isTags(cells)) };
+}
+
+/** The share of the first rows that have as many cells as most of them, of two or more. */
+function evenness(text, separator) {
+  const rows = filled(rowsOf(text, separator, 0, true), LOOKED_AT);
+  const counts = new Map();
+  for (const { cells: { length } } of rows) if (length > 1) counts.set(length, (counts.get(length) ?? 0) + 1);
+  return Math.max(0, ...counts.values()) / Math.max(1, rows.length);
+}
+
+function filled(rows, most = Infinity) {
+  const kept = [];
+  for (const row of rows) {
+    if (row.cells.some((cell) => cell.trim())) kept.push(row);
+    if (kept.length >= most) break;
+  }
+  return kept;
+}
+
+/** The separator that a first line `sep=` names, and what comes after that line. */
+function toldSeparator(text) {
+  const told = /^\s*"?sep=(.)"?[ \t]*(\r\n|\n|\r)/i.exec(text);
+  if (!told) return { separator: null, body: text, before: 0 };
+  return { separator: told[1], body: text.slice(told[0].length), before: told[0].split(/\r\n|\n|\r/).length - 1 };
 }
 
 /** A row that humanitarian data has below the names (HXL): each cell that is filled is a tag. */
@@ -84,14 +128,15 @@ function* rowsOf(text, separator, before, lax = false) {
     line += 1;
     row = { line, cells: [] };
   }
-  if (!lax) throw new FormatError(`line ${line}: a quote is out of place`);
+  if (!lax) throw new FormatError(t("{row}: a quote is out of place", { row: rowText("line", line) }));
 }
 
 /** Reads the numbers of one file, whose decimals are either all points or all commas. */
 export class Numbers {
-  /** @param {string} separator of the file's cells */
-  constructor(separator) {
+  /** @param {string} separator of the file's cells @param {"line"|"feature"} [row] what a row of it is */
+  constructor(separator, row = "line") {
     this.separator = separator;
+    this.row = row;
     this.point = null;
     this.comma = null;
   }
@@ -102,19 +147,20 @@ export class Numbers {
     const plain = cell.text.replace("\u2212", "-");
     const decimal = /[.,]/.exec(plain)?.[0];
     if (decimal === ",") {
-      if (this.separator === ",") this.#refuse(cell, "has a decimal comma, in a file with commas between the cells");
+      if (this.separator === ",") this.#refuse(cell, t("has a decimal comma, in a file with commas between the cells"));
       this.comma ??= cell;
     } else if (decimal === ".") this.point ??= cell;
     if (decimal && this.point && this.comma) {
-      const [other, has] = decimal === "," ? [this.point, "point"] : [this.comma, "comma"];
-      this.#refuse(cell, `is ambiguous: line ${other.line} has a decimal ${has}, ${other.text}`);
+      const other = decimal === "," ? this.point : this.comma;
+      const there = { row: rowText(this.row, other.line), number: other.text };
+      this.#refuse(cell, decimal === "," ? t("is ambiguous: {row} has a decimal point, {number}", there) : t("is ambiguous: {row} has a decimal comma, {number}", there));
     }
     const value = decimal === "," ? plain.replace(",", ".") : plain;
-    if (!NUMBER.test(value) || !Number.isFinite(Number(value))) this.#refuse(cell, "is no number");
+    if (!NUMBER.test(value) || !Number.isFinite(Number(value))) this.#refuse(cell, t("is no number"));
     return Number(value);
   }
 
   #refuse({ text, line, column }, why) {
-    throw new FormatError(`line ${line}: \`${column}\` ${why}: ${text}`);
+    throw new FormatError(t("{row}: `{column}` {why}: {text}", { row: rowText(this.row, line), column, why, text }));
   }
 }

@@ -2,8 +2,9 @@
 
 import { POINTS } from "../kinds.js";
 import { amountsOf, heldSettings, isAmounts, isWords, itemFields } from "../schema.js";
+import { t } from "../texts.js";
 import { wordsIn, writtenWords } from "../words.js";
-import { Numbers, plainText, table, toCells } from "./cells.js";
+import { Numbers, plainText, rowText, table, toCells } from "./cells.js";
 import { FormatError } from "./error.js";
 
 const TRUTHS = { true: true, yes: true, 1: true, false: false, no: false, 0: false };
@@ -64,7 +65,7 @@ export function fromCsv(text, present, fields) {
   for (const { line, cells } of rows) {
     const kind = reader.at(cells, "kind").trim().toLowerCase();
     if (kind === "problem") {
-      if (set) throw new FormatError(`line ${line}: the settings stand in line ${set} already`);
+      if (set) throw new FormatError(t("{row}: the settings stand in line {other} already", { row: rowText("line", line), other: String(set) }));
       set = line;
       for (const { column, path, schema } of settings) {
         if (!columns.includes(column)) continue;
@@ -74,10 +75,10 @@ export function fromCsv(text, present, fields) {
         else problem[last] = value;
       }
     } else if (kind in POINTS) (problem[POINTS[kind]] ??= []).push(reader.item(cells, line, itemFields(fields, POINTS[kind])));
-    else throw new FormatError(`line ${line}: \`kind\` is neither ${Object.keys(POINTS).join(", ")} nor problem: ${reader.at(cells, "kind")}`);
+    else throw new FormatError(t("{row}: `kind` is neither {kinds} nor problem: {kind}", { row: rowText("line", line), kinds: Object.keys(POINTS).join(", "), kind: reader.at(cells, "kind") }));
   }
   const notices = reader.leftOut(rows, fields, settings);
-  if (reader.numbers.comma) notices.push(`Decimal commas were read: ${reader.numbers.comma.text} as ${reader.numbers.comma.text.replace(",", ".")}`);
+  if (reader.numbers.comma) notices.push(t("Decimal commas were read: {text} as {number}", { text: reader.numbers.comma.text, number: reader.numbers.comma.text.replace(",", ".") }));
   return { problem, notices };
 }
 
@@ -98,13 +99,13 @@ class Reader {
     if (text === "" || (schema.type !== "string" && !text.trim())) return undefined;
     if (schema.type === "number" || schema.type === "integer") return this.numbers.read(text, line, column);
     if (schema.type === "boolean") return this.#truth(text, line, column);
-    if (schema.enum) return schema.enum.find((each) => String(each).toLowerCase() === text.trim().toLowerCase()) ?? this.#refuse(line, column, text, `is none of ${schema.enum.join(", ")}`);
+    if (schema.enum) return schema.enum.find((each) => String(each).toLowerCase() === text.trim().toLowerCase()) ?? this.#refuse(line, column, text, t("is none of {values}", { values: schema.enum.join(", ") }));
     if (schema.type === "string" || schema.const !== undefined) return plainText(text);
-    if (isWords(schema)) return wordsIn(plainText(text)) ?? this.#refuse(line, column, text, "is no list of words");
+    if (isWords(schema)) return wordsIn(plainText(text)) ?? this.#refuse(line, column, text, t("is no list of words"));
     try {
       return JSON.parse(text);
     } catch {
-      return this.#refuse(line, column, text, "is no JSON");
+      return this.#refuse(line, column, text, t("is no JSON"));
     }
   }
 
@@ -122,7 +123,7 @@ class Reader {
     const count = this.#countOf(name);
     const columns = Array.from({ length: count }, (_, k) => `${stem(name)}_${k + 1}`);
     const missing = columns.find((column) => !this.places.has(column));
-    if (missing) throw new FormatError(`line ${line}: there is no column \`${missing}\`, but one after it`);
+    if (missing) throw new FormatError(t("{row}: there is no column `{column}`, but one after it", { row: rowText("line", line), column: missing }));
     const texts = columns.map((column) => this.at(cells, column));
     if (!needed && texts.every((text) => !text.trim())) return undefined;
     return texts.map((text, k) => (text.trim() ? this.numbers.read(text, line, columns[k]) : 0));
@@ -135,11 +136,11 @@ class Reader {
   }
 
   #truth(text, line, column) {
-    return TRUTHS[text.trim().toLowerCase()] ?? this.#refuse(line, column, text, "is neither true nor false");
+    return TRUTHS[text.trim().toLowerCase()] ?? this.#refuse(line, column, text, t("is neither true nor false"));
   }
 
   #refuse(line, column, text, why) {
-    throw new FormatError(`line ${line}: \`${column}\` ${why}: ${text}`);
+    throw new FormatError(t("{row}: `{column}` {why}: {text}", { row: rowText("line", line), column, why, text }));
   }
 
   /** Say which filled columns were not read. */
@@ -151,7 +152,7 @@ class Reader {
         else for (let k = 1; k <= this.#countOf(name); k += 1) known.add(`${stem(name)}_${k}`);
       }
     }
-    const left = [...this.places].filter(([name, at]) => !known.has(name) && rows.some(({ cells }) => cells[at]?.trim())).map(([name]) => name || "one without a name");
-    return left.length ? [`Columns that are no fields of a problem were left out: ${left.join(", ")}`] : [];
+    const left = [...this.places].filter(([name, at]) => !known.has(name) && rows.some(({ cells }) => cells[at]?.trim())).map(([name]) => name || t("one without a name"));
+    return left.length ? [t("Columns that are no fields of a problem were left out: {columns}", { columns: left.join(", ") })] : [];
   }
 }

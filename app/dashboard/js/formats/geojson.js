@@ -6,7 +6,9 @@
 import { BASE, BASES, POINTS, ZONE, ZONES } from "../kinds.js";
 import { position } from "../problem.js";
 import { heldSettings, isAmounts, isWords, itemFields } from "../schema.js";
+import { t, tn } from "../texts.js";
 import { wordsIn } from "../words.js";
+import { rowText } from "./cells.js";
 import { FormatError } from "./error.js";
 
 /** Names of longitude and latitude on WGS 84. */
@@ -50,7 +52,7 @@ function same(a, b) {
  */
 export function fromGeoJson(collection, present, fields) {
   const { features, settings } = collection;
-  if (!Array.isArray(features)) throw new FormatError("it has no list `features`");
+  if (!Array.isArray(features)) throw new FormatError(t("it has no list `features`"));
   const problem = { ...(settings ?? { ...heldSettings(present, fields), crs: "wgs84" }), uavs: [], targets: [] };
   // Of a file of this page the service judges the positions.
   if (!settings) onGlobe(collection.crs);
@@ -59,10 +61,10 @@ export function fromGeoJson(collection, present, fields) {
   features.forEach((feature, at) => {
     const { kind: given, ...properties } = feature?.properties ?? {};
     const name = nameOf(feature, at);
-    if (!feature?.geometry) return notices.push(`${name} has no geometry and was left out`);
+    if (!feature?.geometry) return notices.push(t("{feature} has no geometry and was left out", { feature: name }));
     const known = { ...POINTS, [ZONE]: ZONES };
     const kind = known[String(given ?? "").toLowerCase()];
-    if (!kind) throw new FormatError(`${name} has no property \`kind\` that is ${Object.keys(POINTS).join(", ")} or ${ZONE}`);
+    if (!kind) throw new FormatError(t("{feature} has no property `kind` that is {kinds} or {zone}", { feature: name, kinds: Object.keys(POINTS).join(", "), zone: ZONE }));
     const schemas = itemFields(fields, kind);
     const item = {};
     for (const [field, value] of Object.entries(properties)) {
@@ -73,7 +75,7 @@ export function fromGeoJson(collection, present, fields) {
     const id = feature.id ?? properties.id;
     if (id !== undefined && id !== null) item.id = String(id);
     const onEarth = ([x, y]) => {
-      if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(`${name} is at ${x}, ${y}: these are no degrees of longitude and latitude`);
+      if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(t("{feature} is at {place}: these are no degrees of longitude and latitude", { feature: name, place: `${x}, ${y}` }));
       return [x, y];
     };
     if (kind === ZONES) {
@@ -85,7 +87,7 @@ export function fromGeoJson(collection, present, fields) {
     const [x, y] = onEarth(placeOf(feature.geometry, name, notices));
     (problem[kind] ??= []).push(placed(kind, item, x, y));
   });
-  if (foreign.size) notices.push(`Attributes that are no fields of a problem were left out: ${[...foreign].join(", ")}`);
+  if (foreign.size) notices.push(t("Attributes that are no fields of a problem were left out: {attributes}", { attributes: [...foreign].join(", ") }));
   return { problem, notices };
 }
 
@@ -95,24 +97,25 @@ function placed(kind, item, x, y) {
   return { ...item, [item.x_c === undefined ? "x_s" : "x_c"]: x, [item.y_c === undefined ? "y_s" : "y_c"]: y };
 }
 
-function nameOf(feature, at) {
-  const { id, name, Name } = feature?.properties ?? {};
-  const called = [feature?.id, id, name, Name].find((each) => each !== undefined && each !== null && each !== "");
-  return `feature ${at + 1}${called === undefined ? "" : ` (${called})`}`;
+export function nameOf(feature, at) {
+  const { id, name, Name, NAME } = feature?.properties ?? {};
+  const called = [feature?.id, id, name, Name, NAME].find((each) => each !== undefined && each !== null && each !== "");
+  const row = rowText("feature", at + 1);
+  return called === undefined ? row : `${row} (${called})`;
 }
 
 /** Refuse coordinates that are no degrees of WGS 84; without a `crs` they are (RFC 7946, 4). */
-function onGlobe(crs) {
+export function onGlobe(crs) {
   const name = crs?.properties?.name ?? crs?.properties?.code ?? crs?.properties?.href;
   if (crs === undefined || crs === null || DEGREES.test(String(name ?? ""))) return;
-  throw new FormatError(`its \`crs\` is ${name ?? JSON.stringify(crs)}: save it with longitude and latitude on WGS 84 (EPSG:4326)`);
+  throw new FormatError(t("its `crs` is {crs}: save it with longitude and latitude on WGS 84 (EPSG:4326)", { crs: String(name ?? JSON.stringify(crs)) }));
 }
 
 /** The corners of a zone, without the last one, which closes the ring. */
 function cornersOf({ type, coordinates }, name) {
-  if (type !== "Polygon" || !Array.isArray(coordinates?.[0])) throw new FormatError(`${name} is a ${type}: a zone is one Polygon`);
+  if (type !== "Polygon" || !Array.isArray(coordinates?.[0])) throw new FormatError(t("{feature} is a {type}: a zone is one Polygon", { feature: name, type }));
   const [ring, ...holes] = coordinates;
-  if (holes.length) throw new FormatError(`${name} has ${holes.length} holes: a zone has none`);
+  if (holes.length) throw new FormatError(tn(holes.length, "{feature} has {count} hole: a zone has none", "{feature} has {count} holes: a zone has none", { feature: name }));
   return ring.length > 1 && same(ring[0], ring.at(-1)) ? ring.slice(0, -1) : ring;
 }
 
@@ -128,23 +131,23 @@ function listOf(value, schema) {
 }
 
 /** Where a feature is; of a polygon the middle, which is said. */
-function placeOf({ type, coordinates }, name, notices) {
+export function placeOf({ type, coordinates }, name, notices) {
   if (type === "Point") return pair(coordinates, name);
   if (type === "MultiPoint" && coordinates?.length === 1) return pair(coordinates[0], name);
   if (type === "Polygon" || type === "MultiPolygon") {
     const rings = (type === "Polygon" ? [coordinates?.[0]] : (coordinates ?? []).map((polygon) => polygon?.[0])).filter((ring) => ring?.length);
-    if (!rings.length) throw new FormatError(`${name} is an empty ${type}`);
+    if (!rings.length) throw new FormatError(t("{feature} is an empty {type}", { feature: name, type }));
     const middles = rings.map((ring) => middleOf(ring.map((place) => pair(place, name))));
-    notices.push(`${name} is a ${type}: its middle was taken`);
+    notices.push(t("{feature} is a {type}: its middle was taken", { feature: name, type }));
     return middles.reduce((a, b) => (b.area > a.area ? b : a)).place;
   }
-  const many = type === "MultiPoint" ? ` of ${coordinates?.length ?? 0} points` : "";
-  throw new FormatError(`${name} is a ${type}${many}: a UAV, an area or a base is one point`);
+  if (type === "MultiPoint") throw new FormatError(t("{feature} is a MultiPoint of {count} points: a UAV, an area or a base is one point", { feature: name, count: coordinates?.length ?? 0 }));
+  throw new FormatError(t("{feature} is a {type}: a UAV, an area or a base is one point", { feature: name, type }));
 }
 
 function pair(coordinates, name) {
   const [x, y] = Array.isArray(coordinates) ? coordinates : [];
-  if (!Number.isFinite(x) || !Number.isFinite(y)) throw new FormatError(`${name} has coordinates that are no numbers: ${JSON.stringify(coordinates)}`);
+  if (!Number.isFinite(x) || !Number.isFinite(y)) throw new FormatError(t("{feature} has coordinates that are no numbers: {coordinates}", { feature: name, coordinates: String(JSON.stringify(coordinates)) }));
   return [x, y];
 }
 

@@ -1,5 +1,6 @@
 /** The text of a file, whatever it was written with. */
 
+import { t } from "../texts.js";
 import { FormatError } from "./error.js";
 
 const MARKS = [
@@ -24,10 +25,10 @@ export function textOf(bytes) {
       text = new TextDecoder("utf-8", { fatal: true }).decode(bytes);
     } catch {
       text = new TextDecoder("windows-1252").decode(bytes);
-      notices.push("It is not UTF-8 and was read as Windows-1252: check the names");
+      notices.push(t("It is not UTF-8 and was read as Windows-1252: check the names"));
     }
   }
-  if (text.includes("\0")) throw new FormatError("this is no text in UTF-8, UTF-16 or Windows-1252");
+  if (text.includes("\0")) throw new FormatError(t("this is no text in UTF-8, UTF-16 or Windows-1252"));
   return { text: text.replace(/^\uFEFF/, ""), notices };
 }
 

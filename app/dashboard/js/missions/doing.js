@@ -4,6 +4,7 @@ import { stateOf } from "../plan.js";
 import { isReload, placeOf } from "../stops.js";
 import { t } from "../texts.js";
 import { timesOf } from "../times.js";
+import { momentText } from "../units.js";
 
 /** The problem of a state as it is drawn: UAVs are where they were seen since, and those that are lost are out. */
 export function asSeen(state, positions, stateNumber) {
@@ -27,20 +28,22 @@ export function doing(uav, route, state, nameOf) {
   const { clock } = state;
   const aloft = stateOf(uav) !== "at its base";
   const last = state.done.findLast((each) => each.uav_id === uav.id);
+  const at = (time) => momentText(state.problem, time);
   if ((uav.available_from ?? 0) > clock) {
-    const until = uav.available_from;
+    const until = at(uav.available_from);
     if (!last) return t("waits until {until}", { until });
-    const place = placeOf(last.base_id ? { kind: "reload", base_id: last.base_id } : last);
-    return last.base_id ? t("reloads at {place} until {until}", { place: nameOf(place), until }) : t("at {place} until {until}", { place: nameOf(place), until });
+    const place = nameOf(placeOf(last.base_id ? { kind: "reload", base_id: last.base_id } : last));
+    return last.base_id ? t("reloads at {place} until {until}", { place, until }) : t("at {place} until {until}", { place, until });
   }
   const [next] = route?.stops ?? [];
   if (next) {
     const { stops: [first] } = timesOf(uav, route, new Map(state.problem.targets.map((target) => [target.id, target])));
-    if (first.waits?.onGround) return t("takes off at {time} to {place}", { time: first.left, place: nameOf(first.id) });
-    return t("to {place}, there at {time}", { time: first.arrival, place: nameOf(first.id) });
+    const place = nameOf(first.id);
+    if (first.waits?.onGround) return t("takes off at {time} to {place}", { time: at(first.left), place });
+    return t("to {place}, there at {time}", { place, time: at(first.arrival) });
   }
   if (uav.ret) return t("flies home");
-  if (aloft && (route?.landing?.time ?? clock) > clock) return t("flies home, there at {time}", { time: route.landing.time });
+  if (aloft && (route?.landing?.time ?? clock) > clock) return t("flies home, there at {time}", { time: at(route.landing.time) });
   return aloft ? t("has landed") : t("at its base");
 }
 

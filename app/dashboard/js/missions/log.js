@@ -1,8 +1,9 @@
 /** What has happened in a mission, the newest first, and what could not be told yet. */
 
-import { h, notify, number } from "../dom.js";
+import { h, notify } from "../dom.js";
 import { get } from "../state.js";
 import { t } from "../texts.js";
+import { moment } from "../units.js";
 import { readEarlier } from "./feed.js";
 import { drop, tellAgain, untoldOf } from "./outbox.js";
 import { effectOf, happened } from "./wording.js";
@@ -60,7 +61,7 @@ function linesOf(events) {
 function row(entry, others) {
   const effect = effectOf(entry);
   return h("li", { class: entry.effect?.flyable === false ? "broken" : null, dataset: { number: entry.number, type: entry.type } },
-    h("span", { class: "hint" }, number(entry.at), " "), happened(entry), others > 0 && h("span", { class: "hint" }, " ", t("and {count} before", { count: others })), effect && h("p", { class: "hint" }, effect));
+    h("span", { class: "hint" }, moment(get().openMission.head.state.problem, entry.at), " "), happened(entry), others > 0 && h("span", { class: "hint" }, " ", t("and {count} before", { count: others })), effect && h("p", { class: "hint" }, effect));
 }
 
 /** The card of what was not sent; hidden where there is none of the mission. */

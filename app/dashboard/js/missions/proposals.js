@@ -1,7 +1,8 @@
 /** Plans that were proposed for a mission: what each changes and gains, to accept or to refuse. */
 
-import { amounts, h, notify, number } from "../dom.js";
-import { baseName, names } from "../plan.js";
+import { h, notify, number } from "../dom.js";
+import { amountsCell } from "../materials.js";
+import { names } from "../plan.js";
 import { get } from "../state.js";
 import { t, tn, tNodes } from "../texts.js";
 import { brought } from "./doing.js";
@@ -69,7 +70,7 @@ export class Proposals {
           h("tr", { dataset: { uav: each.uav_id } }, h("th", { scope: "row" }, each.uav_id), h("td", { class: "wide" }, list(each.before)), h("td", { class: "wide" }, list(each.after))))))),
       h("details", {}, h("summary", {}, tn(moved.length, "What {count} area gets", "What {count} areas get")),
         h("table", { "data-testid": "proposal-areas" }, head([t("Area"), t("In force"), t("Proposed")]), h("tbody", {}, moved.map(({ id }) =>
-          h("tr", { dataset: { area: id } }, h("th", { scope: "row" }, nameOf(id)), h("td", {}, amounts(now.get(id) ?? nothing)), h("td", {}, amounts(then.get(id) ?? nothing))))))));
+          h("tr", { dataset: { area: id } }, h("th", { scope: "row" }, nameOf(id)), h("td", {}, amountsCell(problem, now.get(id) ?? nothing)), h("td", {}, amountsCell(problem, then.get(id) ?? nothing))))))));
   }
 
   async #answer(button, type, proposal) {

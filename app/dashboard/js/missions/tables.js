@@ -1,12 +1,14 @@
 /** What remains of a mission, in tables: UAVs, stops that are planned and done, areas, bases. */
 
 import { stockText } from "../bases.js";
-import { amounts, h, number, shortAmounts, shown } from "../dom.js";
+import { h, number } from "../dom.js";
 import { BASES } from "../kinds.js";
+import { amountsCell, amountsText, materialNames, numbersText } from "../materials.js";
 import { baseName, called, placeNames, rangeLeft } from "../plan.js";
 import { select } from "../state.js";
 import { isReload } from "../stops.js";
-import { t } from "../texts.js";
+import { t, tNodes } from "../texts.js";
+import { durationText, length, moment } from "../units.js";
 import { brought, doing, stopsAhead } from "./doing.js";
 import { LiveTable } from "./live_table.js";
 
@@ -23,8 +25,8 @@ function uavs() {
     table.show(state.problem.uavs, (uav) => {
       const lost = state.lost.includes(uav.id);
       return h("tr", { class: lost ? "lost" : null, dataset: { uav: uav.id } }, nameCell("uavs", uav), h("td", { class: "wide" }, doing(uav, routes.get(uav.id), state, nameOf)),
-        h("td", { class: "n" }, lost ? "–" : number(rangeLeft(uav))), h("td", { class: "n load" }, lost ? "–" : shortAmounts(uav.loadlist, " · ")),
-        h("td", { class: "n" }, positions[uav.id] ? number(positions[uav.id].time) : "–"));
+        h("td", { class: "n" }, lost ? "–" : length(state.problem, rangeLeft(uav))), h("td", { class: "n load" }, lost ? "–" : materialNames(state.problem) ? amountsText(state.problem, uav.loadlist) : numbersText(uav.loadlist, " · ")),
+        h("td", { class: "n" }, positions[uav.id] ? moment(state.problem, positions[uav.id].time) : "–"));
     });
   };
   return { title: t("UAVs"), open: true, table, draw };
@@ -39,8 +41,8 @@ function ahead(tellOf) {
       const committed = uav.committed?.includes(stop.target_id);
       const given = isReload(stop) ? ["reload_done", { uav_id: uav.id, base_id: stop.base_id, amounts: uav.loadlist.map((amount, k) => amount + stop.loaded[k]) }]
         : ["visit_done", { uav_id: uav.id, target_id: stop.target_id, amounts: stop.delivered }];
-      return h("tr", { dataset: { uav: uav.id, stop: stop.target_id ?? stop.base_id, exact: String(given[1].amounts) } }, h("td", { class: "n" }, number(begin)), nameCell("uavs", uav),
-        h("td", {}, nameOf(place), committed && h("span", { class: "chip" }, t("under way"))), h("td", { class: "n" }, isReload(stop) ? t("loads {amounts}", { amounts: shortAmounts(stop.loaded) }) : shortAmounts(stop.delivered)),
+      return h("tr", { dataset: { uav: uav.id, stop: stop.target_id ?? stop.base_id, exact: String(given[1].amounts) } }, h("td", { class: "n" }, moment(state.problem, begin)), nameCell("uavs", uav),
+        h("td", {}, nameOf(place), committed && h("span", { class: "chip" }, t("under way"))), h("td", { class: "n" }, isReload(stop) ? t("loads {amounts}", { amounts: amountsText(state.problem, stop.loaded) }) : amountsText(state.problem, stop.delivered)),
         h("td", {}, h("button", { type: "button", class: "quiet", "aria-label": t("{uav} at {place} is done", { uav: called(uav), place: nameOf(place) }), onclick: () => tellOf(...given) }, t("Done"))));
     });
   };
@@ -57,7 +59,7 @@ function done(tellOf) {
       const at = each.target_id ? nameOf(each.target_id) : baseName(each.base_id);
       const uav = known.get(each.uav_id);
       const open = () => (each.target_id ? tellOf("visit_done", each) : tellOf("reload_done", { uav_id: each.uav_id, base_id: each.base_id }));
-      return h("tr", { dataset: { uav: each.uav_id, stop: each.target_id ?? each.base_id, exact: String(each.amounts) } }, h("td", { class: "n" }, number(each.time)), nameCell("uavs", uav), h("td", {}, at), h("td", { class: "n" }, shortAmounts(each.amounts)),
+      return h("tr", { dataset: { uav: each.uav_id, stop: each.target_id ?? each.base_id, exact: String(each.amounts) } }, h("td", { class: "n" }, moment(state.problem, each.time)), nameCell("uavs", uav), h("td", {}, at), h("td", { class: "n" }, amountsText(state.problem, each.amounts)),
         h("td", {}, each.reported ? h("span", { class: "chip good" }, t("reported"))
           : h("button", { type: "button", class: "quiet", "aria-label": t("Report {uav} at {place}", { uav: called(uav), place: at }), onclick: open }, t("as planned"))));
     });
@@ -73,8 +75,8 @@ function areas() {
     const cancelled = new Set(state.cancelled);
     table.show(state.problem.targets, (target) =>
       h("tr", { class: cancelled.has(target.id) ? "lost" : null, dataset: { area: target.id } }, nameCell("targets", target), h("td", { class: "n" }, number(target.level)),
-        h("td", { class: "n wide" }, amounts(target.loadlist), target.requested && h("span", { class: "hint" }, " ", t("of {amounts}", { amounts: shortAmounts(target.requested) }))),
-        h("td", { class: "n" }, cancelled.has(target.id) ? t("cancelled") : coming.has(target.id) ? amounts(coming.get(target.id)) : "–")));
+        h("td", { class: "n wide" }, target.requested ? tNodes("{amounts} of {asked}", { amounts: amountsCell(state.problem, target.loadlist), asked: h("span", { class: "hint" }, amountsText(state.problem, target.requested)) }).flat() : amountsCell(state.problem, target.loadlist)),
+        h("td", { class: "n" }, cancelled.has(target.id) ? t("cancelled") : coming.has(target.id) ? amountsCell(state.problem, coming.get(target.id)) : "–")));
   };
   return { title: t("Areas"), open: false, table, draw };
 }
@@ -83,7 +85,7 @@ function areas() {
 function bases() {
   const table = new LiveTable("bases", t("Bases"), [[t("Base")], [t("Stock"), true], [t("Turnaround"), true]]);
   const draw = ({ state: { problem } }) => table.show(problem[BASES] ?? [], (base) =>
-    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base), h("td", { class: "n" }, stockText(base.stock)), h("td", { class: "n" }, shown(base.turnaround ?? 0))));
+    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base), h("td", { class: "n" }, stockText(problem, base.stock)), h("td", { class: "n" }, durationText(problem, base.turnaround ?? 0))));
   return { title: t("Bases"), open: false, table, draw };
 }
 

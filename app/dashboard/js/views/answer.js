@@ -1,69 +1,36 @@
 /** The answer: what the plan earns, every route with times and amounts, what is unmet and why. */
 
 import { stocksLeft } from "../bases.js";
-import { amounts, h, number, shown } from "../dom.js";
+import { h, number } from "../dom.js";
 import { assignmentOf, visitsOf } from "../draft.js";
 import { beginDraft, beginWith } from "../drafting.js";
+import { figures } from "../figures.js";
+import { Finder } from "../finder.js";
 import { editorOf, judgement } from "../plan_editor.js";
-import { names, sum } from "../plan.js";
 import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
-import { Portions } from "../portions.js";
-import { requestedBy } from "../problem.js";
 import { registerView } from "../registry.js";
 import { routesTable } from "../routes_table.js";
-import { get, select, set, subscribe } from "../state.js";
+import { get, set, subscribe } from "../state.js";
+import { startTime } from "../start_time.js";
+import { t, tNodes } from "../texts.js";
 import { timeline } from "../timeline.js";
+import { unmetList } from "../unmet_list.js";
 
-const LEAST_GAP = 1e-5;
 const long = { routes: null, unmet: null, timeline: null };
 
-function figures(answer) {
-  const all = [["Reward", answer.reward], ["Satisfaction", answer.satisfaction], ["Distance", answer.distance], ["λ", answer.distance_weight, 3], ["Seconds", answer.elapsed_s, 3]];
-  for (const [title, value] of [["Makespan", answer.makespan], ["Changes", answer.changes]]) if (typeof value === "number") all.splice(-2, 0, [title, value]);
-  return h("dl", { class: "figures", id: "figures" }, all.map(([title, value, digits]) => figure(title, value, digits)), boundFigures(answer));
-}
-
-function figure(title, value, digits) {
-  return h("div", { class: "figure", dataset: { figure: title } }, h("dt", {}, title), h("dd", {}, number(value, digits)));
-}
-
-/** The proven bound and the gap to it, where they were asked for. */
-function boundFigures({ bound, gap }) {
-  const facts = [];
-  if (typeof bound === "number") facts.push(figure("Bound", bound));
-  if (typeof gap === "number") {
-    const share = h("data", { value: String(gap), title: String(gap) }, gap < LEAST_GAP ? "under 0.001 %" : `${shown(100 * gap, 3)} %`);
-    facts.push(h("div", { class: "figure", dataset: { figure: "Gap" } }, h("dt", {}, "Gap"), h("dd", {}, share)));
-  }
-  return facts;
-}
-
 function source(answer) {
-  if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, "A plan that was changed by hand");
+  if (!answer.algorithm) return h("p", { class: "hint", id: "source" }, t("A plan that was changed by hand"));
   const policy = answer.source_policy;
-  const how = [`${answer.algorithm}, seed ${answer.seed} `, answeredBy(answer)];
+  const how = [t("{algorithm}, seed {seed}", { algorithm: answer.algorithm, seed: String(answer.seed) }), " ", answeredBy(answer)];
   if (!policy) return h("p", { class: "hint", id: "source" }, how);
-  return h("p", { class: "hint", id: "source" }, how, ". Policy ", h("strong", { title: policy.id }, policy.name), " was transferred, distance between the tasks ", number(policy.distance));
-}
-
-function unmetList(problem, answer) {
-  const title = answer.unmet.length ? `Unmet needs of ${answer.unmet.length} of ${problem.targets.length} areas` : `All ${problem.targets.length} areas get all they need`;
-  const needs = new Map(problem.targets.map((target) => [target.id, sum(requestedBy(target))]));
-  const nameOf = names(problem.targets);
-  const item = (unmet) =>
-    h("li", { dataset: { targetId: unmet.target_id, code: unmet.code } },
-      h("div", { class: "row spread" }, h("button", { type: "button", class: "quiet", title: unmet.target_id, onclick: () => select({ kind: "targets", id: unmet.target_id }) }, nameOf(unmet.target_id)), unmet.code && h("span", { class: "chip" }, unmet.code.replaceAll("_", " "))),
-      h("p", {}, "lacks ", amounts(unmet.remaining), h("span", { class: "hint" }, ` of ${shown(needs.get(unmet.target_id))}`)),
-      h("p", { class: "hint" }, unmet.reason), typeof unmet.remedy === "string" && h("p", { class: "hint" }, `Would help: ${unmet.remedy}`));
-  const list = h("ul", { class: "unmet", id: "unmet" });
-  long.unmet = new Portions(list, answer.unmet, item, (button) => h("li", {}, button));
-  return h("details", { open: answer.unmet.length > 0 }, h("summary", {}, title), list);
+  return h("p", { class: "hint", id: "source" }, how, h("span", { class: "amount" },
+    tNodes("Policy {policy} was transferred, distance between the tasks {distance}.", { policy: h("strong", { title: policy.id }, policy.name), distance: number(policy.distance) })));
 }
 
 /** Do something to the plan on screen, in a line of its own below the figures. */
 function acts() {
   const button = (title, does) => h("button", { type: "button", onclick: does }, title);
-  return h("div", { class: "row", id: "plan-acts" }, button("Change this plan", beginDraft), button("Begin the next allocation with it", () => {
+  return h("div", { class: "row", id: "plan-acts" }, button(t("Change this plan"), beginDraft), button(t("Begin the next allocation with it"), () => {
     const { answer, answerProblem } = get();
     beginWith(visitsOf(answerProblem, answer));
     set({ view: "allocate" });
@@ -85,17 +52,22 @@ function drawMap() {
 }
 
 registerView({
-  id: "answer", title: "Answer", order: 30, layout: "panel",
+  id: "answer", title: t("Answer"), order: 30, layout: "panel",
   mount(root, { map, dock }) {
     shownMap = map;
-    const stale = staleNote("stale", "The problem was changed after this answer.");
+    const stale = staleNote("stale", t("The problem was changed after this answer."));
+    const begins = startTime();
+    const finder = new Finder(() => {
+      for (const part of [drawRoutes, drawRest]) part(get());
+      markSelection();
+    });
     const locks = h("p", { class: "hint", role: "status", id: "locks-say" });
     const [head, routes, rest] = [h("div", { class: "block" }), h("div", { class: "block" }), h("div", { class: "block" })];
     let markLocks = () => {};
     let editor = null;
     const drawHead = ({ answer, answerProblem, draft }) => {
       if (draft) head.replaceChildren(stale, judgement(answerProblem, answer, draft));
-      else head.replaceChildren(stale, figures(answer), source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), acts());
+      else head.replaceChildren(stale, ...figures(answerProblem, answer), begins, source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), acts());
     };
     const drawRoutes = ({ answer, answerProblem, draft }) => {
       long.routes = null;
@@ -108,22 +80,29 @@ registerView({
         return;
       }
       editor = null;
-      const table = routesTable(answerProblem, answer, (text) => { locks.textContent = text; });
+      finder.fit(answerProblem);
+      const table = routesTable(answerProblem, answer, finder.choose(answerProblem, answer).routes, (text) => { locks.textContent = text; });
       long.routes = table.portions;
       markLocks = table.markLocks;
-      routes.replaceChildren(table.element, locks);
+      // The field that is typed into stays where it is, and so keeps the focus.
+      if (finder.element.parentElement !== routes) routes.replaceChildren(finder.element);
+      for (const other of [...routes.children].slice(1)) other.remove();
+      routes.append(table.element, locks);
     };
     const drawRest = ({ answer, answerProblem, draft }) => {
       // Until the service has said something of the draft, what it said last stays.
       if (draft && !draft.evaluation && !draft.refusal) return;
       Object.assign(long, { unmet: null, timeline: null });
       if (draft?.refusal) {
-        rest.replaceChildren(h("p", { class: "hint" }, "What is unmet is known as soon as no rule is broken."));
+        rest.replaceChildren(h("p", { class: "hint" }, t("What is unmet is known as soon as no rule is broken.")));
         return dock.replaceChildren();
       }
       const plan = draft?.evaluation ?? answer;
-      rest.replaceChildren(...[stocksLeft(answerProblem, plan)].filter(Boolean), unmetList(answerProblem, plan));
-      const { element, portions } = timeline(answerProblem, plan);
+      const chosen = draft ? plan : finder.choose(answerProblem, plan);
+      const unmet = unmetList(answerProblem, plan, chosen.unmet, Boolean(draft));
+      long.unmet = unmet.portions;
+      rest.replaceChildren(...[unmet.element, stocksLeft(answerProblem, plan)].filter(Boolean));
+      const { element, portions } = timeline(answerProblem, plan, chosen.routes);
       long.timeline = portions;
       dock.replaceChildren(...(element ? [element] : []));
     };
@@ -131,7 +110,7 @@ registerView({
       const state = get();
       if (!state.answer) {
         editor = null;
-        root.replaceChildren(h("p", { class: "hint" }, "No plan yet."), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, "Allocate")));
+        root.replaceChildren(h("p", { class: "hint" }, t("No plan yet.")), h("div", {}, h("button", { type: "button", class: "primary", onclick: () => set({ view: "allocate" }) }, t("Allocate"))));
         return dock.replaceChildren();
       }
       if (!head.isConnected) root.replaceChildren(head, routes, rest);
@@ -161,7 +140,7 @@ registerView({
       act();
       if (clicked?.isConnected) root.closest(".panel").scrollTop += clicked.getBoundingClientRect().top - was;
     };
-    subscribe(["answer", "draft"], (_, changed) => {
+    subscribe(["answer", "draft", "begins"], (_, changed) => {
       if (changed.includes("answer")) locks.textContent = "";
       draw();
       drawMap();

@@ -1,51 +1,49 @@
 /** The problem: examples, files, settings, what is selected; below the map a table of all UAVs and areas. */
 
+import { running } from "../allocation.js";
 import { json } from "../api.js";
-import { download, h, notify, shown } from "../dom.js";
-import { Fields, labelled } from "../fields.js";
-import { read, toCsv, toGeoJson, toJson } from "../formats.js";
+import { amountTitle, columnTitle, fieldTitle } from "../columns.js";
+import { download, h, notify } from "../dom.js";
+import { Fields, inLine, labelled, labelOf } from "../fields.js";
+import { toCsv, toGeoJson, toJson } from "../formats.js";
+import { fleetForm, moreLike } from "../fleet_form.js";
 import { Grid } from "../grid.js";
 import { redo, undo } from "../history.js";
+import { templateOf } from "../import_dialog.js";
+import { bring, NOT_SAID, said, takeFile } from "../intake.js";
 import { BASES, ZONES } from "../kinds.js";
-import { edit, materials, open, remove, setMaterials, update } from "../problem.js";
-import { rangeLeft, stateOf } from "../plan.js";
+import { beyond, onEarth } from "../limits.js";
+import { edit, materials, remove, setMaterials, update } from "../problem.js";
+import { rangeLeft, stateText } from "../plan.js";
 import { registerView } from "../registry.js";
 import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
-import { get, select, subscribe } from "../state.js";
+import { get, select, set, subscribe } from "../state.js";
+import { plainNumber, shown, t, writtenNumber } from "../texts.js";
 import { wordsIn, writtenWords } from "../words.js";
 import { cornersOf, drawingControls } from "../zone_form.js";
+import { planNow } from "./allocate.js";
 
 const FILES = { JSON: [toJson, "json", "application/json"], CSV: [toCsv, "csv", "text/csv"], GeoJSON: [toGeoJson, "geojson", "application/geo+json"] };
-/** What people call the fields that have other names; all others go by their own. */
-const TITLES = {
-  uavs: { id: "UAV", x_s: "start x", y_s: "start y", x_c: "now x", y_c: "now y", voyage: "range", dis: "flown", ret: "returning", loadlist: "load" },
-  targets: { id: "Area", level: "urgency", loadlist: "need" },
-  [BASES]: { id: "Base" },
-  [ZONES]: { id: "Zone" },
-};
-const KINDS = { uavs: "UAVs", targets: "Areas", [BASES]: "Bases", [ZONES]: "Zones" };
+const KINDS = { uavs: t("UAVs"), targets: t("Areas"), [BASES]: t("Bases"), [ZONES]: t("Zones") };
 /** Types of settings that have one value, and so one form field. */
 const SINGLE = ["number", "integer", "boolean", "string"];
-const PLACES = { local: "on a plane", wgs84: "longitude, latitude" };
-const NOT_SAID = "The service has not said yet which fields a problem has";
+const PLACES = { local: t("on a plane"), wgs84: t("longitude, latitude") };
+/** Tables to fill in, by what they are of. */
+const TEMPLATES = { targets: t("Template: areas"), uavs: t("Template: UAVs"), [BASES]: t("Template: bases") };
 
 /** Columns of numbers, words and texts, and of amounts one a material where an item has some. */
 function columnsOf(kind, problem) {
   const globe = problem.crs === "wgs84";
-  const titled = (name) => {
-    const title = TITLES[kind][name] ?? name.replaceAll("_", " ");
-    return globe ? title.replace(/\bx$/, "longitude").replace(/\by$/, "latitude") : title;
-  };
   const known = get().fields ? itemFields(get().fields, kind) : {};
   const plain = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
   // Without a stock a base has as much as is asked for, so that there is always a place to write one.
   const held = ([name, schema]) => isAmounts(schema) && problem[kind]?.some((item) => kind === BASES || item[name]);
   const shownAs = (value, schema) => (value && isWords(schema) ? writtenWords(value) : value);
   const scalars = Object.entries(known).filter(plain).map(([name, schema]) => ({
-    name, title: titled(name), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
+    name, title: fieldTitle(kind, name, globe), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
   }));
   const lists = Object.entries(known).filter(held).flatMap(([field]) => Array.from({ length: materials(problem) }, (_, k) => ({
-    name: `${field}/${k}`, title: `${titled(field)} ${k + 1}`, read: (item) => item[field]?.[k],
+    name: `${field}/${k}`, title: amountTitle(kind, field, k, globe), read: (item) => item[field]?.[k],
   })));
   return [...scalars, ...lists];
 }
@@ -54,22 +52,37 @@ function columnsOf(kind, problem) {
 function enter(kind, id, name, text) {
   const item = get().problem[kind].find((each) => each.id === id);
   if (name === "id") {
-    if (!text || get().problem[kind].some((each) => each.id === text)) return notify(`Another id is needed than “${text}”`, "error");
+    if (!text || get().problem[kind].some((each) => each.id === text)) return notify(t("Another id is needed than “{id}”", { id: text }), "error");
     return update(kind, id, { id: text });
   }
   const schema = itemFields(get().fields, kind)[name];
   if (schema && isWords(schema)) {
     const words = text === "" ? undefined : wordsIn(text);
-    return words === null ? notify(`${name} of ${id} needs words with semicolons between`, "error") : update(kind, id, { [name]: words });
+    return words === null ? notify(t("{field} of {item} needs words with semicolons between", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error") : update(kind, id, { [name]: words });
   }
   if (schema?.type === "string") return update(kind, id, { [name]: text || undefined });
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
-  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(`${name} of ${id} needs a number`, "error");
-  if (k === undefined || value === undefined) return update(kind, id, { [field]: value });
-  // Amounts that were not set are those of the load until then; a base has none.
-  const before = item[field] ?? item.loadlist ?? new Array(materials(get().problem)).fill(0);
-  update(kind, id, { [field]: before.with(Number(k), value) });
+  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(t("{field} of {item} needs a number", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error");
+  if (k === undefined || value === undefined) update(kind, id, { [field]: value });
+  else {
+    // Amounts that were not set are those of the load until then; a base has none.
+    const before = item[field] ?? item.loadlist ?? new Array(materials(get().problem)).fill(0);
+    update(kind, id, { [field]: before.with(Number(k), value) });
+  }
+  markBeyond(kind, id);
+}
+
+/** Mark the numbers of an item that are beyond their limits; the service judges all else. */
+function markBeyond(kind, id) {
+  const { problem, fields } = get();
+  const at = problem[kind].findIndex((each) => each.id === id);
+  const globe = problem.crs === "wgs84";
+  const limit = (name, value, schema) => ({ pointer: `/${kind}/${at}/${name}`, detail: Number.isFinite(value) ? beyond(value, onEarth(name, schema, globe)) : null });
+  const found = Object.entries(itemFields(fields, kind)).flatMap(([name, schema]) =>
+    isAmounts(schema) ? (problem[kind][at][name] ?? []).map((value, k) => limit(`${name}/${k}`, value, schema.items)) : [limit(name, problem[kind][at][name], schema)]);
+  const violations = found.filter(({ detail }) => detail);
+  if (violations.length) set({ violations });
 }
 
 function mountTables(dock) {
@@ -127,47 +140,35 @@ async function fillExamples(root) {
   );
 }
 
-/** Open a problem, and say how what was there comes back. */
-function bring(problem, name, told = `${name} is open`) {
-  const { past } = get();
-  open(problem, name);
-  const undoable = get().past !== past;
-  notify(told, "info", undoable ? { title: "Undo", act: undo } : null);
-}
-
 function mountExamples(root) {
-  root.append(h("button", { type: "button", onclick: () => bring({ crs: get().problem.crs }, "New problem", "All is taken away") }, "Empty"));
+  root.append(h("button", { type: "button", onclick: () => bring({ crs: get().problem.crs }, t("New problem"), t("All is taken away")) }, t("Empty")));
   const fill = () => said(() => fillExamples(root));
   subscribe(["algorithms"], fill);
   fill();
 }
 
-async function takeIn(file) {
-  await said(async () => {
-    if (!get().fields) throw new Error(NOT_SAID);
-    const { problem, notices } = read(new Uint8Array(await file.arrayBuffer()), get().problem, get().fields);
-    bring(problem, file.name.replace(/\.[^.]+$/, ""), [`${file.name} is open`, ...notices].join(". "));
-  }, `${file.name}: `);
-}
-
-/** Do something, and say what went wrong with it. */
-async function said(act, what = "") {
-  try {
-    await act();
-  } catch (error) {
-    notify(what + error.message, "error");
-  }
-}
-
 function filesCard() {
-  const input = h("input", { type: "file", id: "import", accept: ".json,.csv,.tsv,.txt,.geojson", hidden: true, onchange: () => { void takeIn(input.files[0]); input.value = ""; } });
+  const input = h("input", { type: "file", id: "import", accept: ".json,.csv,.tsv,.txt,.geojson", hidden: true, onchange: () => { void takeFile(input.files[0]); input.value = ""; } });
   const save = ([make, ending, type]) => said(() => {
     const { problem, problemName, fields } = get();
     if (!fields) throw new Error(NOT_SAID);
     download(`${problemName || "problem"}.${ending}`, make(problem, fields), type);
   });
-  return h("div", { class: "row" }, h("button", { type: "button", onclick: () => input.click() }, "Import…"), input,
-    Object.entries(FILES).map(([title, file]) => h("button", { type: "button", dataset: { export: title }, onclick: () => save(file) }, title)));
+  return [
+    h("div", { class: "row" }, h("button", { type: "button", onclick: () => input.click() }, t("Import…")), input,
+      Object.entries(FILES).map(([title, file]) => h("button", { type: "button", dataset: { export: title }, onclick: () => save(file) }, title))),
+    h("p", { class: "hint" }, t("A problem, or a list of places with whatever columns. A file can be dropped anywhere, a table pasted with Ctrl+V.")),
+    h("div", { class: "row" }, Object.entries(TEMPLATES).map(([kind, title]) => h("button", { type: "button", class: "quiet", dataset: { template: kind }, onclick: () => download(`${kind}.csv`, templateOf(kind), "text/csv") }, title))),
+  ];
+}
+
+/** The way from a problem to its plan. */
+function planning() {
+  const plan = h("button", { type: "button", class: "primary", id: "plan", title: "Ctrl+Enter", onclick: planNow }, t("Plan"));
+  const enable = () => { plan.disabled = running(get().job); };
+  subscribe(["job"], enable);
+  enable();
+  return h("div", { class: "row" }, plan, h("p", { class: "hint" }, t("Finds who flies where, with what.")));
 }
 
 function placing(map) {
@@ -182,13 +183,13 @@ function placing(map) {
     }, title);
     return made;
   };
-  const back = h("button", { type: "button", class: "quiet", title: "Ctrl+Z", onclick: undo }, "Undo");
-  const forth = h("button", { type: "button", class: "quiet", title: "Ctrl+Shift+Z", onclick: redo }, "Redo");
+  const back = h("button", { type: "button", class: "quiet", title: "Ctrl+Z", onclick: undo }, t("Undo"));
+  const forth = h("button", { type: "button", class: "quiet", title: "Ctrl+Shift+Z", onclick: redo }, t("Redo"));
   const enable = () => { back.disabled = !get().past.length; forth.disabled = !get().future.length; };
   subscribe(["past", "future"], enable);
   enable();
   const zone = drawingControls(map);
-  const row = h("div", { class: "row" }, button("uavs", "Place UAVs"), button("targets", "Place areas"), button(BASES, "Place bases"), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, "Fit map"));
+  const row = h("div", { class: "row" }, button("uavs", t("Place UAVs")), button("targets", t("Place areas")), button(BASES, t("Place bases")), zone.button, back, forth, h("button", { type: "button", class: "quiet", onclick: () => map.fit() }, t("Fit map")));
   return [row, zone.steps];
 }
 
@@ -197,16 +198,16 @@ function mountInspector(root) {
   const draw = () => {
     const { selection, problem } = get();
     const item = selection && problem[selection.kind]?.find((each) => each.id === selection.id);
-    if (!item) return root.replaceChildren(h("p", { class: "hint" }, "Select a UAV, an area, a base or a zone on the map or in the table to see and change it."));
+    if (!item) return root.replaceChildren(h("p", { class: "hint" }, t("Select a UAV, an area, a base or a zone on the map or in the table to see and change it.")));
     const { kind, id } = selection;
     const at = problem[kind].indexOf(item);
     const fields = columnsOf(kind, problem).map((column) => {
       const value = column.read(item);
-      const input = h("input", { value: value === undefined ? "" : String(value), autocomplete: "off", spellcheck: "false", name: column.name, onchange: () => enter(kind, id, column.name, input.value.trim()) });
+      const input = h("input", { value: value === undefined ? "" : column.text ? value : writtenNumber(value), autocomplete: "off", spellcheck: "false", name: column.name, onchange: () => enter(kind, id, column.name, column.text ? input.value.trim() : plainNumber(input.value.trim())) });
       return labelled(column.title, input, { pointer: `/${kind}/${at}/${column.name}` });
     });
-    const facts = kind === "uavs" ? `${stateOf(item)}, range left ${shown(rangeLeft(item), 6)} of ${shown(item.voyage, 6)}` : "";
-    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, "Delete")), facts && h("p", { class: "hint" }, facts), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
+    const facts = kind === "uavs" ? t("{state}, range left {left} of {range}", { state: stateText(item), left: shown(rangeLeft(item), 6), range: shown(item.voyage, 6) }) : "";
+    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, t("Delete"))), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
   };
   subscribe(["selection", "problem", "fields"], draw);
   draw();
@@ -227,11 +228,11 @@ function mountSettings(root) {
     const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties, nullable }]) => {
       // What may be left out is not there while nothing of it is filled in.
       const taken = (values) => (nullable && !Object.keys(values).length ? undefined : values);
-      const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, `${name[0].toUpperCase()}${name.slice(1)} ${inner}`])) : {};
+      const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, t("{object} {field}", { object: labelOf(name), field: inLine(labelOf(inner)) })])) : {};
       const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
       return form.element;
     });
-    root.replaceChildren(h("div", { class: "grid2" }, labelled("Positions", where, { pointer: "/crs" }), labelled("Decision steps", most, { pointer: "/max_steps" }), labelled("Kinds of material", kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
+    root.replaceChildren(h("div", { class: "grid2" }, labelled(t("Positions"), where, { pointer: "/crs" }), labelled(t("Decision steps"), most, { pointer: "/max_steps" }), labelled(t("Kinds of material"), kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
   };
   let known = null;
   const redraw = ({ problem, fields }) => {
@@ -247,16 +248,17 @@ function mountSettings(root) {
 }
 
 registerView({
-  id: "problem", title: "Problem", order: 10, layout: "panel",
+  id: "problem", title: t("Problem"), order: 10, layout: "panel",
   mount(root, { map, dock }) {
     const examples = h("div", { class: "row" });
     const inspector = h("div", {});
     const settings = h("div", { class: "block" });
     root.append(
-      h("div", { class: "block" }, h("h2", {}, "Examples"), examples),
-      h("div", { class: "block" }, h("h2", {}, "Import and export"), filesCard()),
-      h("div", { class: "block" }, h("h2", {}, "Edit"), ...placing(map), inspector),
-      h("details", {}, h("summary", {}, "Settings of the problem"), settings),
+      planning(),
+      h("div", { class: "block" }, h("h2", {}, t("Examples")), examples),
+      h("div", { class: "block" }, h("h2", {}, t("Import and export")), ...filesCard()),
+      h("div", { class: "block" }, h("h2", {}, t("Edit")), ...placing(map), fleetForm(map), inspector),
+      h("details", {}, h("summary", {}, t("Settings of the problem")), settings),
     );
     mountTables(dock);
     mountInspector(inspector);
