@@ -35,6 +35,7 @@ from app.solvers.stop import Deadline, never
 
 # The learners are named, not imported, so that this room does not depend on them.
 _TRANSFER = "app.learning.universal.request.warm_up:warm_up"
+_TRANSFER_REST = "app.learning.universal.request.warm_up:warm_up_the_rest"
 _PRELOAD = "app.learning.checkpoints.source_policies:preload"
 
 _LARGEST_TRIED = (1000, 2000)
@@ -265,6 +266,10 @@ def _transfer() -> None:
     resolve(_TRANSFER)(_small_problem())
 
 
+def _rest_of_transfer() -> None:
+    resolve(_TRANSFER_REST)(_small_problem())
+
+
 def _bound() -> None:
     bounding.warm_up(_small_problem())
 
@@ -381,6 +386,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "planned unloading": _unloading,
     "reasons of planned unloading": _planned_reasons,
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
+    "rest of transfer": _rest_of_transfer,
     "reloads": _reloads,
     "combining": _combining,
     "bound": _bound,

@@ -16,26 +16,34 @@ from app.learning.universal.network.architecture import UniversalConfig
 from app.learning.universal.request.transfer import UniversalTransfer
 from app.simulation.arrays import compile_problem
 from app.simulation.stacks import without_reloads
-from app.solvers.protocol import SourcePolicy
+from app.solvers.protocol import Solution, SourcePolicy
 from app.solvers.stop import never
 
 
 def warm_up(problem: Problem) -> None:
-    """Transfer a policy that knows nothing, with every part of a request.
+    """Transfer a policy that knows nothing, with every part of a request that is there by default.
 
     Parameters
     ----------
     problem
         Small; somebody can fly somewhere.
     """
-    parameters = TransferQmixParameters(samples=2, n_epochs=1, polish_moves=100)
-    policy = PairwisePolicy.of_seed(PairwiseConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
-    before = UniversalPolicy.of_seed(UniversalConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
-    source = SourcePolicy("", "", 0.0)
-    with one_thread():
-        before.play(without_reloads(compile_problem(problem)), np.zeros(1, np.int64))
-        transfer = UniversalTransfer(problem, parameters, 0, never, lambda _progress: None)
-        solution = transfer.run([Source(source, policy)])
+    solution = _transfer(problem, TransferQmixParameters(samples=2, n_epochs=1, polish_moves=100))
     if solution.checkpoint is None:
         raise ValueError("somebody must be able to fly somewhere in the problem")
     verify(solution.checkpoint, problem)
+
+
+def warm_up_the_rest(problem: Problem) -> None:
+    """Do what is asked for seldom: replans, and policies of the architecture before; see :func:`warm_up`."""
+    _transfer(problem, TransferQmixParameters(samples=0, replans=8, n_epochs=0, polish=False))
+    before = UniversalPolicy.of_seed(UniversalConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
+    with one_thread():
+        before.play(without_reloads(compile_problem(problem)), np.zeros(1, np.int64))
+
+
+def _transfer(problem: Problem, parameters: TransferQmixParameters) -> Solution:
+    policy = PairwisePolicy.of_seed(PairwiseConfig(width=8, layers=1, qmix_hidden_dim=4), seed=0)
+    with one_thread():
+        transfer = UniversalTransfer(problem, parameters, 0, never, lambda _progress: None)
+        return transfer.run([Source(SourcePolicy("", "", 0.0), policy)])
