@@ -112,7 +112,7 @@ def test_numbers_have_one_minus_sign(shared_page):
     page = shared_page
     ready(page)
     minus = page.evaluate(
-        "async () => { const { shown } = await import('/dashboard/js/dom.js');"
+        "async () => { const { shown } = await import('/dashboard/js/texts.js');"
         " return [-1, -82.27].map((value) => shown(value)); }"
     )
     assert minus == ["−1", "−82.27"]

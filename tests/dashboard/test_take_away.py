@@ -87,7 +87,9 @@ def test_documents_are_the_services(planned, service, format):
 
     _, content = saved(page, format)
 
-    response = httpx.get(f"{service.url}/jobs/{answer['job_id']}/plan", params={"format": format})
+    # A page to print has above it what the problem is called.
+    asked = {"format": format} | ({"title": state(page, "problemName")} if format == "html" else {})
+    response = httpx.get(f"{service.url}/jobs/{answer['job_id']}/plan", params=asked)
     assert content == response.content
 
 
