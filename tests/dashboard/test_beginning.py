@@ -139,20 +139,20 @@ def test_a_fleet_is_added_at_a_base_and_where_the_map_is_clicked(shared_page):
     page.locator("#fleet").get_by_label("How many").fill("3")
     page.locator("select[name=fleet-place]").select_option(label="Port of Beira")
     page.click("[data-add=fleet]")
-    expect(page.locator(".symbol.uavs")).to_have_count(5)
+    expect(page.locator("[data-table=uavs]")).to_have_text("UAVs 5")
     added = state(page, "problem")["uavs"][2:]
     assert [(uav["name"], uav["x_s"], uav["speed"], uav["voyage"], uav["loadlist"]) for uav in added] == [
         (f"VTOL {n}", 34.84, 100, 75, [4.5]) for n in (1, 2, 3)
     ]
     page.locator("body").press("Control+z")
-    expect(page.locator(".symbol.uavs")).to_have_count(2)
+    expect(page.locator("[data-table=uavs]")).to_have_text("UAVs 2")
 
     page.locator("select[name=fleet-place]").select_option(label="where I click on the map")
     page.click("[data-add=fleet]")
     page.locator("#map").click(position={"x": 60, "y": 120})
-    expect(page.locator(".symbol.uavs")).to_have_count(5)
+    expect(page.locator("[data-table=uavs]")).to_have_text("UAVs 5")
     page.locator("#map").click(position={"x": 90, "y": 150})
-    expect(page.locator(".symbol.uavs")).to_have_count(5)
+    expect(page.locator("[data-table=uavs]")).to_have_text("UAVs 5")
 
     page.locator("#fleet").get_by_label("How many").fill("many")
     page.click("[data-add=fleet]")
@@ -185,7 +185,7 @@ def test_the_first_uav_on_the_globe_can_fly_somewhere(shared_page):
     ("column", "text", "limit"),
     [
         ("speed", "-5", "it has to be more than 0"),
-        ("y_s", "200", "it has to be from -90 to 90"),
+        ("y_s", "200", "it has to be from \u221290 to 90"),
         ("loadlist/0", "-1", "it has to be at least 0"),
     ],
 )

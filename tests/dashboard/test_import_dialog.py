@@ -43,6 +43,7 @@ def choose(page, text, name="places.csv"):
 
 
 def columns(dialog):
+    dialog.locator("thead select").first.wait_for()
     return dialog.locator("thead select").evaluate_all(
         "all => all.map((each) => each.selectedOptions[0].text)"
     )

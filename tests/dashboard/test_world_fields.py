@@ -148,7 +148,7 @@ def test_zones_are_polygons_of_a_map(openapi):
     taken, *refused = run(openapi, "return given.files.map(read);", files=files)
     assert taken["problem"]["no_fly_zones"] == [{"id": "zone-1", "name": "Airport", "polygon": SQUARE}]
     assert [each["refused"] for each in refused] == [
-        "feature 1 has 1 holes: a zone has none",
+        "feature 1 has 1 hole: a zone has none",
         "feature 1 is a MultiPolygon: a zone is one Polygon",
         "feature 1 is a Point: a zone is one Polygon",
         "feature 1 is at 181, 0: these are no degrees of longitude and latitude",
