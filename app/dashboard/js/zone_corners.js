@@ -69,7 +69,7 @@ export class ZoneCorners {
   /** The middle of the zone's box, by which all of it is moved. */
   #addWhole(zone) {
     const { x, y } = L.bounds(zone.polygon.map((corner) => this.map.latLngToLayerPoint(this.#latLng(corner)))).getCenter();
-    const marker = this.#handle(this.map.layerPointToLatLng([x, y]), "corner whole", `All of ${called(zone)}`);
+    const marker = this.#handle(this.map.layerPointToLatLng([x, y]), "corner whole", t("All of {zone}", { zone: called(zone) }));
     const from = this.map.latLngToLayerPoint(marker.getLatLng());
     const by = () => { const away = this.map.latLngToLayerPoint(marker.getLatLng()).subtract(from); return [away.x, away.y]; };
     marker.on("drag", () => this.#drawSides(zone.polygon.map((corner) => this.#moved(corner, by()))));

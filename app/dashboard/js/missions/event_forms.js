@@ -145,7 +145,7 @@ function stockChanged({ base_id: id }, { state: { problem } }) {
 }
 
 function zonesChanged({ polygon, without, shapes }) {
-  if (shapes) return { title: "Zones have another shape", says: "It counts once it is told.", parts: [shapes], read: () => ({ type: "zones_changed", no_fly_zones: shapes.read() }) };
+  if (shapes) return { title: t("Zones have another shape"), says: t("It counts once it is told."), parts: [shapes], read: () => ({ type: "zones_changed", no_fly_zones: shapes.read() }) };
   // All zones are told: those that there are when it is told, as others may have changed them since it was opened.
   const now = () => {
     const zones = get().openMission.head.state.problem[ZONES] ?? [];

@@ -65,7 +65,7 @@ export class Happened {
     const possible = OF[selection.kind].filter(([type]) => type !== "reload_done" || moment.state.problem[BASES]?.length);
     this.acts.replaceChildren(h("strong", { title: item.id }, called(item)), ...possible.map(([type, title]) =>
       h("button", { type: "button", dataset: { type }, onclick: () => this.open(type, { [KEYS[selection.kind]]: item.id }) }, title)));
-    if (selection.kind === ZONES) this.acts.append(h("p", { class: "hint" }, "Drag its corners, or all of it by its middle, on the map; by keyboard with Alt and the arrows."));
+    if (selection.kind === ZONES) this.acts.append(h("p", { class: "hint" }, t("Drag its corners, or all of it by its middle, on the map; by keyboard with Alt and the arrows.")));
   }
 
   /** Open the form of something that has happened. @param {string} type of the event @param {object} given what was clicked */

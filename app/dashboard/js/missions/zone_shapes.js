@@ -8,6 +8,7 @@ import { h } from "../dom.js";
 import { ZONES } from "../kinds.js";
 import { called } from "../plan.js";
 import { get, subscribe } from "../state.js";
+import { tn } from "../texts.js";
 import { ZoneCorners } from "../zone_corners.js";
 import { cornersOf, faultOf } from "../zone_form.js";
 
@@ -56,7 +57,7 @@ export class ZoneShapes {
     if (this.said === said) return;
     this.said = said;
     const { crs } = get().openMission.head.state.problem;
-    const line = (zone) => h("p", { dataset: { shape: zone.id } }, [`${called(zone)} has ${zone.polygon.length} corners.`, faultOf(zone, crs)].filter(Boolean).join(" "));
+    const line = (zone) => h("p", { dataset: { shape: zone.id } }, [tn(zone.polygon.length, "{zone} has {count} corner.", "{zone} has {count} corners.", { zone: called(zone) }), faultOf(zone, crs)].filter(Boolean).join(" "));
     const own = (zone) => [h("h5", {}, called(zone)), ...cornersOf(zone, { crs }, (polygon) => this.#change(zone.id, polygon))];
     this.element.replaceChildren(...zones.flatMap((zone) => (zone.id === this.shown?.id ? own(zone) : [line(zone)])));
   }
