@@ -262,12 +262,8 @@ def _algorithm(name: str) -> None:
         tasks.verify(found.artifact, problem)
 
 
-def _transfer() -> None:
-    resolve(_TRANSFER)(_small_problem())
-
-
-def _rest_of_transfer() -> None:
-    resolve(_TRANSFER_REST)(_small_problem())
+def _named(warm_up_of: str) -> None:
+    resolve(warm_up_of)(_small_problem())
 
 
 def _bound() -> None:
@@ -382,11 +378,11 @@ def _untold(_progress: Progress) -> None:
 
 _PARTS: dict[str, Callable[[], None]] = {
     "greedy": partial(_algorithm, "greedy"),
-    "transfer": _transfer,
+    "transfer": partial(_named, _TRANSFER),
     "planned unloading": _unloading,
     "reasons of planned unloading": _planned_reasons,
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
-    "rest of transfer": _rest_of_transfer,
+    "rest of transfer": partial(_named, _TRANSFER_REST),
     "reloads": _reloads,
     "combining": _combining,
     "bound": _bound,

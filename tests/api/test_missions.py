@@ -381,8 +381,7 @@ def test_a_retry_with_the_same_key_is_the_same_mission(begin, client):
     now = mission.get()
     assert again.json() == {name: now[name] for name in again.json()}
     assert again.json()["clock"] == 0.5
-    assert other.status_code == 422
-    assert other.json()["type"] == "/docs/errors#idempotency-key-reused"
+    assert (other.status_code, other.json()["type"]) == (422, "/docs/errors#idempotency-key-reused")
     assert mission.id in other.json()["detail"]
     assert [each["name"] for each in client.get("/missions").json()["missions"]].count("once") == 1
 

@@ -238,10 +238,9 @@ async def get_plan(
     delivery: Annotated[
         Delivery,
         Query(
-            description="Flight files: how material is left at a stop. "
-            "payload-place: MAV_CMD_NAV_PAYLOAD_PLACE; "
-            "servo: MAV_CMD_DO_SET_SERVO; gripper: MAV_CMD_DO_GRIPPER; land: land and take off again; "
-            "none: fly there"
+            description="Flight files: how material is left at a stop. payload-place: "
+            "MAV_CMD_NAV_PAYLOAD_PLACE; servo: MAV_CMD_DO_SET_SERVO; gripper: MAV_CMD_DO_GRIPPER; land: land "
+            "and take off again; none: fly there"
         ),
     ] = Delivery.PAYLOAD_PLACE,
     end: Annotated[
@@ -283,12 +282,12 @@ async def get_plan(
 ) -> Response:
     """Write a plan in a format of the field.
 
-    UAVs of one place fly one above the other and take off one after the other; what that makes late is among
-    the warnings of a flight, which are in the briefing, in maps and in the notes of a `.plan`.
-
+    UAVs of one place fly one above the other and take off one after the other; what that makes late is
+    among the warnings of a flight, which are in the briefing, in maps and in the notes of a `.plan`.
     Before a flight file is written, every position, altitude, speed and stay is checked against what the
-    format holds, and at every stop that the UAV is within its range; all that is wrong is listed. A UAV that
-    is on its way already (it has flown, or is not where it started) gets a mission without a take-off.
+    format holds, and at every stop that the UAV is within its range; all that is wrong is listed. A UAV
+    that is on its way already (it has flown, or is not where it started) gets a mission without a
+    take-off.
     """
     choices = FlightChoices(
         altitude_m=altitude,
