@@ -218,7 +218,8 @@ LISTS = {"uavs", "targets"}
     [
         # Rows and features are of one list or the other; amounts of the load are columns `load_1`, ….
         ("schema.js", LISTS),
-        ("formats.js", LISTS | {"id"}),
+        # The third is a word of its sentences.
+        ("formats.js", LISTS | {"id", "bases"}),
         ("fields.js", {"id"}),
         ("kinds.js", LISTS | {"id", "bases", "no_fly_zones"}),
         ("formats/cells.js", set()),

@@ -40,7 +40,7 @@ _EPISODES = 64
 _EPOCH_WORK = 4e6
 """Work of these together, about a tenth of a second; larger problems have fewer of them."""
 
-_POLISH_SHARE = 0.4
+_POLISH_SHARE = 0.3
 """Moves of the local search by those of ``local_search``; the rest of its time goes to the policy."""
 
 
