@@ -2438,9 +2438,8 @@ class PlanChoices(TypedDict):
     """With altitude_by=leg: m that legs of one altitude are away from each other."""
 
     altitude_of: NotRequired[list[str] | None]
-    """Flights: altitude of a UAV in m, as `uav-7=90` or, measured from something else than the others,
-    `uav-7=90@terrain`; or of a leg, as `uav-7/2=90` for that to its second stop (reloads are stops, and
-    the last leg leads home); may be repeated."""
+    """Flights: altitude in m of a UAV, as `uav-7=90`, or of a leg, `uav-7/2=90` to its second stop (reloads
+    are stops, the last leg leads home), from `@terrain` or `@home`."""
 
     altitude_reference: NotRequired[AltitudeReference | None]
     """Flights: what altitudes are measured from; default: home, but the terrain for flights of more than 5
@@ -2472,5 +2471,4 @@ class PlanChoices(TypedDict):
     """html: what stands above the plan; default: its id."""
 
     begins: NotRequired[str | None]
-    """html: when the plan begins, by the clock where it is flown, as `2026-03-01T07:30`; times are of the
-    day then. Default: they count from the begin."""
+    """html: when it begins, by the clock where it is flown; default: times count from 0."""

@@ -124,7 +124,7 @@ class _Worker:
             # Once only the worker has the other end, the pipe closes when the worker dies.
             self._their_end.close()
             self._reader.start()
-        except Exception as error:
+        except Exception as error:  # whatever it is, it is raised where the start is waited for
             with contextlib.suppress(InvalidStateError):
                 self._started.set_exception(error)
             return

@@ -8,12 +8,8 @@ import pytest
 from mission_days import require_sound
 
 SMALL = {
-    "uavs": [
-        {"x_s": 0.0, "y_s": float(i), "speed": 1.0, "voyage": 40.0, "loadlist": [6.0]} for i in range(2)
-    ],
-    "targets": [
-        {"id": f"area-{j}", "x": 2.0 * j, "y": 1.0, "level": 1.0, "loadlist": [2.0]} for j in (1, 2, 3)
-    ],
+    "uavs": [{"x_s": 0.0, "y_s": y, "speed": 1.0, "voyage": 40.0, "loadlist": [6.0]} for y in (0.0, 1.0)],
+    "targets": [{"id": f"area-{j}", "x": 2.0 * j, "y": 1.0, "level": 1, "loadlist": [2]} for j in (1, 2, 3)],
     "objective": {"distance_weight": 0.01},
     "max_steps": 6,
 }

@@ -27,7 +27,7 @@ FIELD = {
 
 @pytest.fixture
 def newcomer(browser, service):
-    """A page of somebody who has never opened what is advanced."""
+    """A page on which *Advanced* was never opened."""
     context = browser.new_context(viewport={"width": 1366, "height": 900})
     context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()

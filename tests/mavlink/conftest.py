@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import httpx
 import pytest
 from live_service import SMALL, LiveService
+from told_mission import ToldMission
 
 from app.api.openapi_examples import example_problem
 
@@ -19,7 +20,7 @@ def service(tmp_path_factory) -> Iterator[LiveService]:
         running.stop()
 
 
-class Mission:
+class Mission(ToldMission):
     """A mission as another client sees it, with the plan of a first search in force."""
 
     def __init__(self, url, **changes):
@@ -27,18 +28,7 @@ class Mission:
         problem = {key: problem[key] for key in problem if key not in {"algorithm", "time_limit_s"}}
         self.problem = {**problem, **changes}
         body = {"problem": self.problem, "time_limit_s": 0.3, "algorithm": "local_search"}
-        self.url = f"{url}/missions"
-        self.id = self._ask("POST", json=body).json()["id"]
-        self.url += f"/{self.id}"
-
-    def _ask(self, method, path="", **content):
-        return httpx.request(method, self.url + path, timeout=60, **content).raise_for_status()
-
-    def read(self, path=""):
-        return self._ask("GET", path).json()
-
-    def tell(self, name, **event):
-        return self._ask("POST", "/events", json={"id": name, **event}).json()
+        super().__init__(url, body)
 
     def accept(self, name):
         """Accept the open proposal, once the search has ended; say whether there was one.

@@ -3,9 +3,9 @@
 import threading
 from collections.abc import Iterator
 
-import httpx
 from dashboard_steps import begin_again
 from playwright.sync_api import Page, expect
+from told_mission import ToldMission
 
 AREA = {"level": 1, "loadlist": [3], "service_time": 0.5}
 UAV = {"x_s": 0, "y_s": 0, "speed": 2, "voyage": 60, "loadlist": [6], "full_load": [6]}
@@ -28,23 +28,12 @@ def without_a_mission(page: Page) -> Iterator[Page]:
     page.unroute_all()
 
 
-class Mission:
+class Mission(ToldMission):
     """A mission as another client of the service sees it."""
 
     def __init__(self, service, problem=SMALL, **planning):
         body = {"problem": problem, "time_limit_s": 0.2, "algorithm": "local_search", **planning}
-        self.url = f"{service.url}/missions"
-        self.id = self._ask("POST", json=body).json()["id"]
-        self.url += f"/{self.id}"
-
-    def _ask(self, method, path="", **content):
-        return httpx.request(method, self.url + path, timeout=60, **content).raise_for_status()
-
-    def read(self, path=""):
-        return self._ask("GET", path).json()
-
-    def tell(self, name, **event):
-        return self._ask("POST", "/events", json={"id": name, **event}).json()
+        super().__init__(service.url, body)
 
     def delete(self):
         self._ask("DELETE")

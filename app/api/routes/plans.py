@@ -213,9 +213,8 @@ async def get_plan(
         list[Annotated[str, Field(max_length=130, pattern=_OWN_ALTITUDE.pattern)]] | None,
         Query(
             max_length=1000,
-            description="Flights: altitude of a UAV in m, as `uav-7=90` or, measured from something else "
-            "than the others, `uav-7=90@terrain`; or of a leg, as `uav-7/2=90` for that to its second stop "
-            "(reloads are stops, and the last leg leads home); may be repeated",
+            description="Flights: altitude in m of a UAV, as `uav-7=90`, or of a leg, `uav-7/2=90` to its "
+            "second stop (reloads are stops, the last leg leads home), from `@terrain` or `@home`",
         ),
     ] = None,
     altitude_reference: Annotated[
@@ -275,8 +274,7 @@ async def get_plan(
     begins: Annotated[
         datetime | None,
         Query(
-            description="html: when the plan begins, by the clock where it is flown, as `2026-03-01T07:30`; "
-            "times are of the day then. Default: they count from the begin"
+            description="html: when it begins, by the clock where it is flown; default: times count from 0"
         ),
     ] = None,
 ) -> Response:
