@@ -17,7 +17,14 @@ from app.simulation.generator import FAMILIES, generate
 from app.solvers.column_generation.packing import Packing, next_reward, reachable
 from app.solvers.column_generation.pool import collect, new_pool, often_whole, pour, thin
 from app.solvers.greedy import greedy_plan
-from app.solvers.local_search.annealing import actions_of, anneal, drop_useless, new_search, set_routes
+from app.solvers.local_search.annealing import (
+    Prices,
+    actions_of,
+    anneal,
+    drop_useless,
+    new_search,
+    set_routes,
+)
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.improvement import Cooling, improve
 from app.solvers.local_search.solver import LocalSearch
@@ -31,7 +38,7 @@ def collected(problem, seed=1, moves=2000):
     arrays = compile_problem(problem)
     search = new_search(arrays)._replace(pool=new_pool(arrays))
     set_routes(search, greedy_plan(problem).as_array())
-    anneal(search, np.random.default_rng(seed), moves, 3.0, 0.1, 0.3, 0.0, 0.0, True)
+    anneal(search, np.random.default_rng(seed), moves, 3.0, 0.1, Prices(0.3), True)
     drop_useless(search)
     return search
 
@@ -207,7 +214,7 @@ def test_rounds_are_longer_where_plans_turn_out_to_have_many_visits():
     problem = parcels(np.random.default_rng(10), m=20, n=80)
     search = new_search(compile_problem(problem))
     combination = Combination([search], rounds=9, left=100.0)
-    anneal(combination.searches[0], np.random.default_rng(1), 50_000, 3.0, 0.1, 0.3, 0.0, 0.0, True)
+    anneal(combination.searches[0], np.random.default_rng(1), 50_000, 3.0, 0.1, Prices(0.3), True)
     drop_useless(search)
     assert search.best_length.sum() > 60
     assert combination.after_round(1, 9, never) == 2

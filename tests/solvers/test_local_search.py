@@ -19,6 +19,7 @@ from app.simulation.generator import generate
 from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import (
+    Prices,
     actions_of,
     anneal,
     draw_change,
@@ -134,7 +135,7 @@ def test_annealed_plans_are_legal_and_earn_what_the_search_says():
     rng = np.random.default_rng(13)
     for problem, search in able(rng, 60, max_uavs=8, max_targets=10):
         scale = max(float(search.arrays.areas["level"].max()), 1e-9)
-        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, 0.01 * scale, large=0.3)
+        anneal(search, rng, 3000, 0.2 * scale, 0.05 * scale, Prices(0.01 * scale), large=0.3)
         assert_evaluated(search)
         assert search.routes.total[SATISFACTION] <= search.most
         drop_useless(search)

@@ -41,6 +41,23 @@ ROUNDING = 1e-11
 """Relative error that the totals of a plan may have after the changes of a call, and more."""
 
 
+class Prices(NamedTuple):
+    """What an annealing charges beside what the objective does, in reward.
+
+    Attributes
+    ----------
+    useless
+        A visit that unloads nothing; more than 0, so that it goes.
+    haste, thrift
+        A unit of time, and of distance beyond its weight: room in the routes is worth something before
+        anything is put into it.
+    """
+
+    useless: float
+    haste: float = 0.0
+    thrift: float = 0.0
+
+
 class Search(NamedTuple):
     """One search: its problem, its current plan, its incumbent.
 
@@ -256,14 +273,21 @@ def draw_change(search: Search, rng: np.random.Generator, large: float) -> bool:
     """Propose a random change that rule 2 allows, of a large move with a probability; False where none is."""
     arrays, routes, near, change = search.arrays, search.routes, search.near, search.change
     if large > 0.0 and rng.random() < large:
-        return rebuild(arrays, routes, near, change, search.placing, rng)
-    return draw_move(arrays, routes, near, change, rng) and feasible(arrays, change)
+        return rebuild(arrays, routes, near, change, search.placing, rng) and _is_own(near, change)
+    return draw_move(arrays, routes, near, change, rng) and _is_own(near, change) and feasible(arrays, change)
+
+
+@compiled
+def _is_own(near: Neighbourhood, change: Change) -> bool:
+    """Whether the routes that a change proposes may be changed."""
+    i, i2 = change.uav[0], change.uav[1]
+    return (i == NONE or near.own[i]) and (i2 == NONE or near.own[i2])
 
 
 @compiled_nogil
 def anneal(
-    search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, penalty: float,
-    haste: float = 0.0, thrift: float = 0.0, collecting: bool = False, large: float = 0.0,
+    search: Search, rng: np.random.Generator, moves: int, hot: float, cold: float, prices: Prices,
+    collecting: bool = False, large: float = 0.0,
 ) -> int:  # fmt: skip
     """Try moves while the temperature falls geometrically from `hot` to `cold`; return how many were kept.
 
@@ -277,11 +301,8 @@ def anneal(
         How many to try.
     hot, cold
         Temperatures, in reward.
-    penalty
-        What a visit that unloads nothing costs during the search, in reward; more than 0, so that it goes.
-    haste, thrift
-        What a unit of time, and of distance beyond its weight, costs during the search, in reward: room in
-        the routes is worth something before anything is put into it.
+    prices
+        What else costs reward during the search.
     collecting
         Whether the routes that a kept change makes go to the search's pool.
     large
@@ -298,16 +319,16 @@ def anneal(
         if not draw_change(search, rng, large):
             continue
         extra, closing = extra_distance(arrays, routes, change), extra_closing(arrays, routes, change)
-        price = (weight + thrift) * extra + haste * extra_time(routes, change) + closing
+        price = (weight + prices.thrift) * extra + prices.haste * extra_time(routes, change) + closing
         # What the change has to bring to be kept; most bring less, and of many that is known beforehand.
         least = temperature * math.log(1.0 - rng.random())
-        if search.most - routes.total[SATISFACTION] + penalty * routes.total[USELESS] - price < least:
+        if search.most - routes.total[SATISFACTION] + prices.useless * routes.total[USELESS] - price < least:
             continue
         apply(arrays, routes, change, extra, closing)
         gain = (
             routes.total[SATISFACTION]
             - change.total[SATISFACTION]
-            - penalty * (routes.total[USELESS] - change.total[USELESS])
+            - prices.useless * (routes.total[USELESS] - change.total[USELESS])
             - price
         )
         if gain >= least:

@@ -54,7 +54,7 @@ class Combination:
         """Prepare to combine the routes of several rounds, in a part of the seconds left."""
         arrays = searches[0].arrays
         time_enough = left >= _WORTH_S
-        self._on = rounds > 1 and time_enough and is_combined(arrays, searches[0].routes.length)
+        self.on = rounds > 1 and time_enough and is_combined(arrays, searches[0].routes.length)
         self._left, self._unlimited = left, math.isinf(left)
         self._begin, self._spent = time.monotonic(), 0.0
         self.seconds = 0.0
@@ -63,7 +63,7 @@ class Combination:
         """Whether the incumbent is known to be a best plan."""
         self.searches = list(searches)
         """The searches, with pools."""
-        if self._on:
+        if self.on:
             self.searches = [search._replace(pool=new_pool(arrays)) for search in searches]
             self._visits = int(searches[0].routes.length.sum())
             self._pricing = Pricing(arrays, self.searches[0].pool)
@@ -88,7 +88,7 @@ class Combination:
             How many rounds there are to be in all: under a time limit fewer, once it is known that plans have
             many visits.
         """
-        if not self._on:
+        if not self.on:
             return rounds
         first, *others = self.searches
         for search in others:

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy as np
 from app.simulation.legs import UNREACHABLE
 from app.solvers.local_search.annealing import (
     ROUNDING,
+    Prices,
     Search,
     actions_of,
     anneal,
@@ -27,6 +29,7 @@ from app.solvers.local_search.annealing import (
 )
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import large_moves, moves_a_second, rounds_for
+from app.solvers.local_search.sharing import Team, moves_at_once, pays
 from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import StopCriterion
 
@@ -118,7 +121,10 @@ def improve_together(
     cooling: Cooling,
     watch: Watch,
 ) -> None:
-    """Anneal from the searches' current plans, a thread each; after a round all go on from the best plan.
+    """Anneal from the searches' current plans, a thread each.
+
+    Where a plan has UAVs enough, the threads share it out among them; otherwise each has its own, and after a
+    round all go on from the best one.
 
     Parameters
     ----------
@@ -142,8 +148,9 @@ def improve_together(
     """
     stop = stops[0]
     begin, left = time.monotonic(), stop.seconds_left()
+    possible = float(moves)
     if left < math.inf:
-        possible = left * moves_a_second(searches[0].arrays)
+        possible = min(possible, left * moves_a_second(searches[0].arrays))
         rounds = rounds_for(rounds, possible / max(moves, 1))
     combination = Combination(searches, rounds, left)
     searches = combination.searches
@@ -151,6 +158,14 @@ def improve_together(
     idle = not (len(first.near.active) and len(first.near.wanted))
     number, tried = 0, 0
     with ThreadPoolExecutor(max(1, len(searches) - 1)) as threads:
+        if not combination.on and pays(first, len(searches), possible / rounds):
+            team = Team(searches, generators, stops, threads)
+            crews = [_Crew(team.anneal, first, stop, len(searches))]
+        else:
+            crews = [
+                _Crew(partial(_alone, search, rng), search, ends)
+                for search, rng, ends in zip(searches, generators, stops, strict=True)
+            ]
         while number < rounds and not combination.proven and not stop():
             now, end = time.monotonic(), np.inf
             count = moves * (number + 1) // rounds - tried
@@ -162,31 +177,51 @@ def improve_together(
                 def tell(share: float, number: int = number, rounds: int = rounds) -> None:
                     watch((number + share) / rounds, number)
 
-                others = [
-                    threads.submit(_round, search, rng, span, cooling, ends, _silent)
-                    for search, rng, ends in zip(searches[1:], generators[1:], stops[1:], strict=True)
-                ]
-                _round(first, generators[0], span, cooling, stop, tell)
+                others = [threads.submit(_round, crew, span, cooling, _silent) for crew in crews[1:]]
+                _round(crews[0], span, cooling, tell)
                 for other in others:
                     other.result()
                 tried += count
                 if not stop():
                     rounds = combination.after_round(number + 1, rounds, stop)
-                _share_best(searches)
+                _share_best([crew.search for crew in crews])
             number += 1
             watch(1.0 if combination.proven else number / rounds, number)
     drop_idle_reloads(first)
 
 
-def _round(
-    search: Search,
-    rng: np.random.Generator,
-    span: _Span,
-    cooling: Cooling,
-    stop: StopCriterion,
-    tell: Callable[[float], None],
-) -> None:
-    """One round of one search; the plan at its end is made legal."""
+class _Crew(NamedTuple):
+    """Who makes the moves of a round.
+
+    Attributes
+    ----------
+    anneal
+        Takes the moves of each thread, after how many of them to ask whether to stop, the temperatures,
+        prices, whether routes are collected, and the probability of a large move.
+    search
+        Whose plan it is.
+    stop
+        Ends the round.
+    threads
+        How many share the plan.
+    """
+
+    anneal: Callable[[int, int, float, float, Prices, bool, float], None]
+    search: Search
+    stop: StopCriterion
+    threads: int = 1
+
+
+def _alone(
+    search: Search, rng: np.random.Generator, moves: int, _at_once: int, hot: float, cold: float,
+    prices: Prices, collecting: bool, large: float,
+) -> None:  # fmt: skip
+    anneal(search, rng, moves, hot, cold, prices, collecting, large)
+
+
+def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], None]) -> None:
+    """One round of one plan, which is legal at its end."""
+    search = crew.search
     largest, scale = gains(search.arrays, search.routes)
     leg = neighbour_leg(search.arrays, search.near)
     coldest = coldest_by_distance(search.arrays, leg, cooling.cold * scale)
@@ -195,22 +230,24 @@ def _round(
         cooling = cooling._replace(hot=_FREE_HOT, cold=_FREE_COLD)
         haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
         coldest = cooling.cold * scale
-    piece = max(100, round(_PIECE_S * moves_a_second(search.arrays)))
+    prices = Prices(cooling.penalty * scale, haste, thrift)
+    a_second = moves_a_second(search.arrays)
+    at_once = max(100, round(_PIECE_S * a_second))
     done, share, told = 0, span.share(0), 0.0
-    step = piece / span.moves
     stops, expected = int(search.routes.length.sum()), float(span.moves)
     if span.end < np.inf:
-        expected = min(expected, moves_a_second(search.arrays) * (span.end - span.begin))
+        expected = min(expected, a_second * (span.end - span.begin))
+    piece = at_once if crew.threads == 1 else moves_at_once(expected, a_second)
+    step = piece / span.moves
     large, cost = large_moves(search.routes.length)
-    while done < span.moves and share < 1.0 and not stop():
+    while done < span.moves and share < 1.0 and not crew.stop():
         count = min(piece, span.moves - done)
-        begin = cooling.hot if span.end == np.inf else _begin(cooling, expected, stops)
+        begin = cooling.hot if span.end == np.inf else _begin(cooling, crew.threads * expected, stops)
         ratio = coldest / (begin * largest)
         hot, cold = (begin * ratio**part * largest for part in (share, min(share + step, 1.0)))
-        anneal(
-            search, rng, max(1, round(count / cost)), hot, cold, cooling.penalty * scale, haste, thrift,
-            share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav), large,
-        )  # fmt: skip
+        collecting = share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav)
+        made, at_a_time = (max(1, round(each / cost)) for each in (count, at_once))
+        crew.anneal(made, at_a_time, hot, cold, prices, collecting, large)
         done += count
         now = span.share(done)
         expected = done / max(now, 1e-9)

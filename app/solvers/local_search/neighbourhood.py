@@ -40,6 +40,8 @@ class Neighbourhood(NamedTuple):
         (L, D) and (M, D) bases, nearest first, from a target or base, and from where a UAV is.
     reluctant
         (M,) UAVs for which one visit alone, to some of these, earns less than its way costs.
+    own
+        (M,) UAVs whose routes may be changed.
     """
 
     active: Integers
@@ -49,6 +51,7 @@ class Neighbourhood(NamedTuple):
     near_base: Integers
     near_base_at_start: Integers
     reluctant: Flags
+    own: Flags
 
 
 def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
@@ -57,7 +60,7 @@ def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     length = max(1, min(NEAR, len(wanted) - 1))
     between = arrays.between[0].min(axis=0)
     np.fill_diagonal(between, np.inf)
-    near_start = _nearest(arrays.start_target[0], wanted, length)
+    near_start = nearest(arrays.start_target[0], wanted, length)
     bases = np.arange(arrays.shape[1] + 1, arrays.between.shape[2])
     loads = (arrays.load[0] > 0).any(axis=1)
     if len(bases):
@@ -69,15 +72,16 @@ def neighbourhood(arrays: ProblemArrays) -> Neighbourhood:
     return Neighbourhood(
         active=np.flatnonzero(~arrays.ret[0] & loads),
         wanted=wanted,
-        near_target=_nearest(between, wanted, length),
+        near_target=nearest(between, wanted, length),
         near_start=near_start,
-        near_base=_nearest(between, bases, len(bases)),
-        near_base_at_start=_nearest(arrays.start_target[0], bases, len(bases)),
+        near_base=nearest(between, bases, len(bases)),
+        near_base_at_start=nearest(arrays.start_target[0], bases, len(bases)),
         reluctant=reluctant,
+        own=np.ones(len(near_start), np.bool_),
     )
 
 
-def _nearest(distance: np.ndarray, wanted: Integers, length: int) -> Integers:
+def nearest(distance: np.ndarray, wanted: Integers, length: int) -> Integers:
     """(rows, length) wanted columns of least distance, least first; zeros where there are none."""
     if not len(wanted):
         return np.zeros((len(distance), length), np.int64)
