@@ -15,9 +15,8 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,99 +27,24 @@ import torch
 sys.path[:0] = [str(Path(__file__).parents[2])]
 
 from library_on_trial import library_of, policies_for_every_size  # noqa: E402
+from problem_kinds import KINDS  # noqa: E402
 
 from app.domain.problem import Problem  # noqa: E402
 from app.learning.parameters import TransferQmixParameters  # noqa: E402
 from app.learning.transfer import TransferQmix  # noqa: E402
 from app.learning.universal.training.curriculum import with_greedy_unloading  # noqa: E402
-from app.simulation.drawn_generator import drawn, drawn_size  # noqa: E402
-from app.simulation.drawn_surroundings import with_surroundings  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
-from app.simulation.generator import FAMILIES, generate  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
 from app.solvers.registry import create_solver, parse_parameters  # noqa: E402
 from app.solvers.stop import Deadline, never  # noqa: E402
 
 STREAM = 70_000_027
-SIZES = ((5, 10), (7, 15), (10, 20), (20, 30))
 PURE = {"n_epochs": 0, "polish": False}
 WAYS: dict[str, dict[str, Any]] = {
     "one-roll-out": {**PURE, "samples": 0, "orders": 1},
     "first-sight": {**PURE, "samples": 0},
     "64-samples": {**PURE, "samples": 64},
     "default": {},
-}
-
-Random = np.random.Generator
-
-
-def of_a_family(number: int, rng: Random) -> Problem:
-    """Families take turns, then sizes; K is 3 in half of them, otherwise 1 to 6."""
-    m, n = SIZES[number // len(FAMILIES) % len(SIZES)]
-    k = 3 if rng.random() < 0.5 else int(rng.integers(1, 7))
-    return generate(list(FAMILIES)[number % len(FAMILIES)], m, n, k, rng)
-
-
-def of_no_family(_number: int, rng: Random) -> Problem:
-    return drawn(*drawn_size(rng), rng)
-
-
-def until(is_wanted: Callable[[Problem], bool], make: Callable[[Random], Problem], rng: Random) -> Problem:
-    """Draw until a problem is of the kind."""
-    while not is_wanted(problem := make(rng)):
-        pass
-    return problem
-
-
-def with_bases(number: int, rng: Random) -> Problem:
-    return until(lambda p: bool(p.bases), partial(of_no_family, number), rng)
-
-
-def surrounded(number: int, rng: Random) -> Problem:
-    return with_surroundings(of_no_family(number, rng), rng)
-
-
-def all_deadlines(_number: int, rng: Random) -> Problem:
-    """15 x 40 of any place, with a deadline at every area."""
-    return until(lambda p: all(t.deadline is not None for t in p.targets), lambda r: drawn(15, 40, 3, r), rng)
-
-
-def six_materials(_number: int, rng: Random) -> Problem:
-    """Six materials, of which a UAV carries one or two."""
-    return until(
-        lambda p: all(0 < sum(a > 0 for a in u.loadlist) <= 2 for u in p.uavs),
-        lambda r: drawn(*drawn_size(r)[:2], 6, r),
-        rng,
-    )
-
-
-def all_alike(number: int, rng: Random) -> Problem:
-    """UAVs that differ in nothing."""
-    problem = of_a_family(number, rng)
-    first = problem.uavs[0]
-    return replace(problem, uavs=tuple(replace(first, id=uav.id) for uav in problem.uavs))
-
-
-def many_visits(_number: int, rng: Random) -> Problem:
-    """Twenty visits a UAV, about: few UAVs with range and load for all of it."""
-    m = int(rng.integers(1, 5))
-    problem = generate("clustered", m, 20 * m, 2, rng)
-    uavs = tuple(
-        replace(uav, voyage=4.0 * uav.voyage, loadlist=tuple(20.0 * amount for amount in uav.loadlist))
-        for uav in problem.uavs
-    )
-    return replace(problem, uavs=uavs, max_steps=25)
-
-
-KINDS = {
-    "families": of_a_family,
-    "no-family": of_no_family,
-    "bases": with_bases,
-    "surrounded": surrounded,
-    "deadlines": all_deadlines,
-    "six-materials": six_materials,
-    "alike": all_alike,
-    "many-visits": many_visits,
 }
 
 
