@@ -31,13 +31,14 @@ from app.solvers.start import own_plan
 def nothing_to_fly(problem: Problem) -> bool:
     """Say whether no plan earns more than staying at home, because no UAV has an allowed visit in any.
 
-    A first visit begins where a UAV is, or at a base that it reloads at before. Where there are bases and the
-    way home costs reward, that is never said: a reload may shorten it.
+    A first visit begins where a UAV is, or at a base that it reloads at before. Where a reload is allowed and
+    the way home costs reward, that is never said: the reload may shorten it.
     """
     arrays = compile_problem(problem)
-    if not arrays.n_bases:
-        return bool(new_episodes(arrays, 1).done[0])
-    return not arrays.terms["charge_return"][0] and not _any_served(problem, arrays)
+    if new_episodes(arrays, 1).done[0]:
+        return True
+    reloads_alone = arrays.n_bases > 0 and not arrays.terms["charge_return"][0]
+    return reloads_alone and not _any_served(problem, arrays)
 
 
 def _any_served(problem: Problem, arrays: ProblemArrays) -> bool:
