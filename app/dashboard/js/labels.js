@@ -43,7 +43,7 @@ export class Labels {
     const chosen = selection && this.markers.of(selection);
     const seen = [];
     for (const symbol of this.markers.symbols.values()) {
-      const at = this.map.latLngToLayerPoint(symbol.marker.getLatLng());
+      const at = this.map.latLngToLayerPoint(symbol.at);
       const [x, y, half] = [at.x + symbol.dx, at.y + symbol.dy, symbol.size / 2];
       if (!sight.contains(at.add(origin))) continue;
       taken.add({ left: x - half, top: y - half, right: x + half, bottom: y + half });
