@@ -87,7 +87,8 @@ def take_mission(page: Page) -> None:
     page.locator("[data-testid=mission-UAVs] tr[data-uav=mid-2] button").click()
     page.locator("#mission-acts button[data-type=uav_lost]").click()
     page.get_by_test_id("mission-happened").get_by_role("button", name="Tell").click()
-    expect(page.get_by_role("button", name="Accept")).to_be_visible(timeout=60_000)
+    expect(page.locator("[data-testid=mission-log] li[data-type=uav_lost]")).to_be_attached()
+    expect(page.get_by_test_id("mission-planning")).to_have_text("A better plan was found.", timeout=60_000)
     page.evaluate("async () => (await import('/dashboard/js/state.js')).select(null)")
     page.locator("#panel").evaluate("(panel) => panel.scrollTo(0, 0)")
 

@@ -11,6 +11,9 @@ SMALL = """(smallest) => [...document.querySelectorAll("button, .button, summary
     .map((each) => [each.outerHTML.slice(0, 90), each.getBoundingClientRect()])
     .filter(([, { width, height }]) => width < smallest - 0.5 || height < smallest - 0.5)
     .map(([says, { width, height }]) => `${says} ${width} x ${height}`)"""
+CUT_OFF = """() => [...document.querySelectorAll("button")]
+    .filter((each) => each.checkVisibility() && each.scrollWidth > each.clientWidth + 1)
+    .map((each) => each.outerHTML.slice(0, 120))"""
 
 
 @pytest.fixture
@@ -45,9 +48,11 @@ def test_a_question_mark_that_is_typed_is_one(page):
     expect(page.locator("#keys-dialog[open]")).to_have_count(0)
 
 
-@pytest.mark.parametrize("width", [390, 820])
-def test_what_a_finger_has_to_hit_is_large_enough(browser, service, width):
-    context = browser.new_context(has_touch=True, is_mobile=True, viewport={"width": width, "height": 1180})
+@pytest.mark.parametrize(("width", "locale"), [(390, "fr-FR"), (820, "en")])
+def test_what_a_finger_has_to_hit_is_large_enough_and_not_cut_off(browser, service, width, locale):
+    context = browser.new_context(
+        has_touch=True, is_mobile=True, viewport={"width": width, "height": 1180}, locale=locale
+    )
     context.set_default_timeout(PATIENCE_MS)
     context.add_init_script(ADVANCED)
     page = context.new_page()
@@ -61,7 +66,7 @@ def test_what_a_finger_has_to_hit_is_large_enough(browser, service, width):
         page.locator("summary").evaluate_all(
             "all => all.forEach((each) => { each.parentElement.open = true; })"
         )
-        found[view] = page.evaluate(SMALL, SMALLEST_PX)
+        found[view] = [*page.evaluate(SMALL, SMALLEST_PX), *page.evaluate(CUT_OFF)]
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), view
     context.close()
     assert {view: small for view, small in found.items() if small} == {}
