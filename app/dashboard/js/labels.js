@@ -21,6 +21,8 @@ export class Labels {
     this.widths = new Map();
     this.later = null;
     map.on("moveend zoomend resize viewreset", () => this.soon());
+    // At another zoom names are not where they were; a pan takes them along.
+    map.on("zoomend viewreset", () => this.pane.replaceChildren());
   }
 
   /** Lay them out once nothing has changed for a moment. */
