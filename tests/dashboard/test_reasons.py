@@ -12,6 +12,7 @@ from worlds import random_sorties, random_world
 from app.domain.allocation import UnmetCode
 from app.domain.records import problem_to_record, to_record
 from app.domain.warnings import CODES
+from app.missions.effects import GONE
 from app.simulation.breaches import NAMES
 from app.simulation.explain import explain
 from app.solvers.greedy import greedy_plan
@@ -63,7 +64,7 @@ def pointer_of(code):
 @pytest.mark.parametrize("tag", LANGUAGES)
 def test_every_code_has_a_sentence_in_every_language_and_an_unknown_one_the_services(tag):
     codes = [code.value for code in UnmetCode]
-    rules = sorted(set(NAMES.values()) - {"no_such_action"})
+    rules = sorted({*NAMES.values(), *GONE} - {"no_such_action"})
     found = said(
         tag,
         unmet=[{"problem": PROBLEM, "plan": PLAN, "unmet": entry(code)} for code in [*codes, "a_new_one"]],

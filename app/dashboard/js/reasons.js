@@ -77,7 +77,7 @@ function stopBefore(problem, plan, { uav_id: uavId, step }) {
   return before ? placeNames(problem)(placeOf(before)) : null;
 }
 
-/** Rules that an action of a plan can break. */
+/** Rules that an action of a plan can break, and why a mission's plan loses a stop. */
 const RULES = {
   returning: t("a returning UAV makes no more visits"),
   barred: t("no way leads there, or home from there, or the UAV lacks a skill or must not be sent there"),
@@ -89,9 +89,11 @@ const RULES = {
   reloaded: t("it has just reloaded"),
   unloads_nothing: t("it would unload nothing"),
   max_steps: t("the plan has more steps than are allowed"),
+  uav_lost: t("the UAV is lost"),
+  area_cancelled: t("the area was cancelled"),
 };
 
-/** The rule that an action breaks. @param {{rule: string, says: string}} breach as `POST /evaluate` has it; a rule that is not known here is in the service's words */
+/** The rule that an action breaks. @param {{rule: string, says: string}} breach as `POST /evaluate` and missions have it; a rule that is not known here is in the service's words */
 export function ruleText({ rule, says }) {
   return RULES[rule] ?? says;
 }
