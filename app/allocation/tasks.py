@@ -67,7 +67,8 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     if limit.leaves_none_for(algorithm):
         return _result(problem, _stand_in(problem, payload, limit, context), payload, limit)
     parameters = parse_parameters(algorithm, payload["parameters"], stored=True)
-    solver = create_solver(algorithm, parameters, _means(payload, context))
+    keeps = bool(payload.get("keep_checkpoint"))
+    solver = create_solver(algorithm, parameters, _means(payload, context), keeps_checkpoint=keeps)
     report = _report(context, algorithm, known)
     solution = solver.solve(problem, payload["seed"], limit.searching, report)
     limit.searched(algorithm)

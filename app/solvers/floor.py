@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation.arrays import compile_problem
+from app.simulation.amounts import Amounts
+from app.simulation.arrays import NONE, ProblemArrays, compile_problem
 from app.simulation.evaluation import reward_of
+from app.simulation.flown_plan import record_plan
+from app.simulation.from_start import look_from_start
 from app.simulation.simulator import new_episodes
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import (
@@ -24,8 +29,35 @@ from app.solvers.start import own_plan
 
 
 def nothing_to_fly(problem: Problem) -> bool:
-    """Say whether no UAV has an allowed visit, so that there is but one plan."""
-    return bool(new_episodes(compile_problem(problem), 1).done[0])
+    """Say whether no plan earns more than staying at home, because no UAV has an allowed visit in any.
+
+    A first visit begins where a UAV is, or at a base that it reloads at before. Where a reload is allowed and
+    the way home costs reward, that is never said: the reload may shorten it.
+    """
+    arrays = compile_problem(problem)
+    if new_episodes(arrays, 1).done[0]:
+        return True
+    reloads_alone = arrays.n_bases > 0 and not arrays.terms["charge_return"][0]
+    return reloads_alone and not _any_served(problem, arrays)
+
+
+def _any_served(problem: Problem, arrays: ProblemArrays) -> bool:
+    """Whether a UAV can come to a target with something that it needs, whatever it is committed to."""
+    stays = Plan.empty(problem.n_uavs, problem.n_targets).as_array()
+    nothing = np.zeros((*stays.shape, problem.n_materials))
+    if arrays.terms["plans_loading"][0]:
+        # What one UAV leaves at a base another one may take.
+        arrays = arrays._replace(stock=np.full_like(arrays.stock, np.inf))
+    plan = record_plan(arrays, stays, Amounts(nothing, nothing), planned=False)
+    wanted = np.flatnonzero(arrays.areas["need_total"][0] > 0.0)
+    # Mostly one of the first targets is served: twice as many each time.
+    first, count = 0, 1
+    while first < len(wanted):
+        some = wanted[first : first + count]
+        if (look_from_start(arrays, plan, some).able[some] != NONE).any():
+            return True
+        first, count = first + count, 2 * count
+    return False
 
 
 class Floor:
@@ -44,7 +76,7 @@ class Floor:
         Whether the floor is the greedy rule's plan, as far as there is time for it; if not, it is staying at
         home.
     learns
-        Whether what it learns is asked for even where nothing can be flown. Otherwise it is not run there.
+        Whether what it learns is asked for, even where nothing can be flown. Otherwise it is not run there.
     """
 
     def __init__(self, algorithm: Solver, parameters: Parameters, *, greedy: bool, learns: bool) -> None:

@@ -291,11 +291,20 @@ def unusable_architecture(problem: Problem) -> str | None:
     return cast(str, _resolve(_PAPERS_NETWORKS)) if unusable else None
 
 
-def create_solver(name: str, parameters: Parameters, context: SolverContext) -> Solver:
+def create_solver(
+    name: str, parameters: Parameters, context: SolverContext, *, keeps_checkpoint: bool = True
+) -> Solver:
     """Load an algorithm's implementation and build it, able to plan the unloading too.
 
     No answer of it earns less than staying at home, and none but of the algorithms for comparison and of
-    paper mode less than the greedy rule.
+    paper mode less than the greedy rule. Where no plan earns more than staying at home, it answers at once.
+
+    Parameters
+    ----------
+    name, parameters, context
+        The algorithm, and what it is built from.
+    keeps_checkpoint
+        Whether what it learns is asked for, so that it learns also where no plan earns anything.
 
     Raises
     ------
@@ -305,7 +314,8 @@ def create_solver(name: str, parameters: Parameters, context: SolverContext) -> 
     line = algorithm(name)
     solver = _resolve(line.solver)(parameters, context)
     own = line.comparison or _mode_of(parameters) == _PAPER
-    floored = _resolve(_FLOOR)(solver, parameters, greedy=not own, learns=line.learns)
+    learns = line.learns and keeps_checkpoint
+    floored = _resolve(_FLOOR)(solver, parameters, greedy=not own, learns=learns)
     return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored))
 
 

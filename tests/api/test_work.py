@@ -84,6 +84,20 @@ def test_time_that_is_up_stops_it():
     replay(record(), done.result["assignment"])
 
 
+@pytest.mark.parametrize("algorithm", ["auto", "local_search", "transfer_qmix", "qmix", "ga"])
+def test_where_nobody_has_the_range_staying_at_home_is_proven_without_a_search(algorithm):
+    problem = record()
+    problem["uavs"] = [{**uav, "voyage": 0.001} for uav in problem["uavs"]]
+    told = []
+    context = WorkContext.in_process(told.append, time_limit_s=60.0)
+
+    done = tasks.allocate(payload(algorithm, {}, problem), context).result
+
+    assert done["proof"] == {"bound": 0.0, "proven": True}
+    assert [progress.fraction for progress in told] == [1.0]
+    assert {unmet["code"] for unmet in done["unmet"]} == {"out_of_range"}
+
+
 def best_plan():
     done = tasks.allocate(payload("local_search", {}), WorkContext.in_process(lambda _progress: None))
     return done.result

@@ -1,11 +1,12 @@
 """How long the dashboard takes to redraw: 100 UAVs by 300 areas, and 1000 by 2000, the service's most.
 
-Run it with ``CHROMIUM=/usr/bin/chromium python tests/benchmarks/bench_dashboard.py``: the browser with
-windows, not the shell that the tests prefer. It starts a service and the browser, and at each size opens a
-problem, edits one area, allocates it greedily, goes through the views and drags the map forty times. The UAVs
-start anywhere, or at three bases. A pan is measured from each movement of the pointer until the frame with it
-has been drawn, all else from the call until the frame after it. The limit is 50 ms for a pan; without a
-graphics card, the browser's own rasteriser is in the figures. ``--pictures FOLDER`` keeps a picture of each.
+Run it with ``python tests/benchmarks/bench_dashboard.py``; ``CHROMIUM=/usr/bin/chromium`` takes the browser
+with windows instead of the shell that the tests prefer. Compare figures of one browser only. It starts a
+service and the browser, and at each size opens a problem, edits one area, allocates it greedily, goes through
+the views and drags the map forty times. The UAVs start anywhere, or at three bases. A pan is measured from
+each movement of the pointer until the frame with it has been drawn, all else from the call until the frame
+after it. The limit is 50 ms for a pan; without a graphics card, the browser's own rasteriser is in the
+figures. ``--pictures FOLDER`` keeps a picture of each.
 """
 
 from __future__ import annotations

@@ -18,6 +18,13 @@ from playwright.sync_api import Page, expect  # noqa: E402 - tests are no packag
 OUT = ROOT / "app" / "dashboard" / "screenshots"
 SIZE = {"width": 1280, "height": 800}
 LIMIT_BYTES = 150_000
+PROPOSED = """async () => {
+    const { get } = await import("/dashboard/js/state.js");
+    const { events, proposals } = get().openMission;
+    const lost = events.find(({ type }) => type === "uav_lost");
+    return lost && proposals.some(({ status, of_number: of }) => status === "open" && of >= lost.number);
+}"""
+"""Whether a plan was found for what is left after a UAV was lost."""
 
 
 def main() -> None:
@@ -87,7 +94,8 @@ def take_mission(page: Page) -> None:
     page.locator("[data-testid=mission-UAVs] tr[data-uav=mid-2] button").click()
     page.locator("#mission-acts button[data-type=uav_lost]").click()
     page.get_by_test_id("mission-happened").get_by_role("button", name="Tell").click()
-    expect(page.get_by_role("button", name="Accept")).to_be_visible(timeout=60_000)
+    page.wait_for_function(PROPOSED, timeout=60_000)
+    expect(page.get_by_role("button", name="Accept")).to_be_visible()
     page.evaluate("async () => (await import('/dashboard/js/state.js')).select(null)")
     page.locator("#panel").evaluate("(panel) => panel.scrollTo(0, 0)")
 

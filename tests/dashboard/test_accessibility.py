@@ -67,6 +67,9 @@ def test_no_view_breaks_a_rule(audited, service, width, scheme):
     page.click("#key")
     faults["key"] = violations(page)
     page.click("#key-cancel")
+    page.locator("#map").press("?")
+    faults["keys"] = violations(page)
+    page.keyboard.press("Escape")
     go(page, "problem")
     page.locator("#import").set_input_files(
         {"name": "list.csv", "mimeType": "text/csv", "buffer": b"name,lat,lon,need\nA,1,2,3\nB,1,east,3\n"}

@@ -112,7 +112,7 @@ def test_the_answer_on_screen_is_the_services(again, service):
     for item, expected in zip(unmet, answer["unmet"], strict=True):
         assert numbers(item) == expected["remaining"]
         assert item.get_attribute("data-code") == expected["code"]
-        assert expected["reason"] in item.inner_text()
+        assert item.locator("p.hint").first.get_attribute("title") == expected["reason"]
 
 
 def test_the_transferred_policy_is_named(again, service):

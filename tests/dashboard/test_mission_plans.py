@@ -154,3 +154,23 @@ def test_two_dispatchers_fly_a_whole_day(browser, service):
     assert troubles == []
     for context in contexts:
         context.close()
+
+
+PROPOSED = """async () => {
+    const { Proposals } = await import("/dashboard/js/missions/proposals.js");
+    const uav = { id: "u", x_s: 0, y_s: 0, speed: 1, voyage: 9, loadlist: [1] };
+    const area = { id: "a", name: "Town", x: 1, y: 1, level: 1, loadlist: [2] };
+    const problem = { uavs: [uav], targets: [area] };
+    const stops = [{ target_id: "a", step: 1 }, { base_id: "port", step: 2 }];
+    const differences = { uavs: [{ uav_id: "u", before: [], after: stops }], visits_changed: 1 };
+    const proposal = { number: 2, status: "open", gained: 0.5, routes: [], differences };
+    const head = { id: "m", state: { problem }, planning: {} };
+    const card = new Proposals(() => {});
+    card.draw({ head, plan: { number: 1, routes: [] }, proposals: [proposal] });
+    return card.element.querySelector("[data-testid=proposal-stops] tr[data-uav=u]").textContent;
+}"""
+
+
+def test_a_proposal_with_a_reload_names_the_base(shared_page):
+    ready(shared_page)
+    assert shared_page.evaluate(PROPOSED) == "uhomeTown → base port"

@@ -222,3 +222,17 @@ def test_amounts_say_what_they_are_of():
         "2 red cells, 3 material 2",
         "7 water, l",
     ]
+
+
+def test_where_nobody_can_fly_why_is_said_first_and_staying_at_home_is_the_best(page, service):
+    near = {**NAMED, "uavs": [{**UAV, "id": "u", "voyage": 1}]}
+    open_problem(page, near)
+    answer = show_answer(page, service.url, algorithm="auto", time_limit_s=20)
+    assert {unmet["code"] for unmet in answer["unmet"]} == {"out_of_range"}
+    go(page, "answer")
+    says = "2 areas: No UAV that carries any of it has the range to fly there, not even directly."
+    expect(page.locator("#nobody-flies li")).to_have_text([says])
+    expect(figure(page, "How sure")).to_contain_text("No plan earns more: that is proven.")
+    open_problem(page, NAMED)
+    show_answer(page, service.url)
+    expect(page.locator("#nobody-flies")).to_have_count(0)

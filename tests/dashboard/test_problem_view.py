@@ -141,6 +141,33 @@ def test_what_is_selected_says_its_state_and_takes_changes(page, show):
     expect(card).to_contain_text("range left 47.5 of 50")
 
 
+def test_returning_is_a_box_and_what_is_of_a_flight_is_there_once_a_uav_has_left(page, show):
+    waiting = [{**LOCAL["uavs"][1], "ret": 0}]
+    show({**LOCAL, "uavs": waiting})
+    page.click("[data-table=uavs]")
+    heads = page.locator("table[data-kind=uavs] thead")
+    expect(heads).not_to_contain_text("now x")
+    row = page.locator("table[data-kind=uavs] tr[data-id=b]")
+    row.locator("td[data-column=ret]").click()
+    page.keyboard.press("Enter")
+    expect(row.locator("td[data-column=ret]")).to_have_text("✓")
+    assert json.loads(exported(page, "JSON"))["uavs"][0]["ret"] == 1
+    box = page.locator("#view-problem .card input[name=ret]")
+    expect(box).to_be_checked()
+    box.uncheck()
+    expect(row.locator("td[data-column=ret]")).to_have_text("")
+    assert "ret" not in json.loads(exported(page, "JSON"))["uavs"][0]
+
+    flight = page.locator("#view-problem .card [data-part=flight]")
+    expect(flight.locator("input[name=dis]")).to_be_hidden()
+    flight.locator("summary").click()
+    flight.locator("input[name=dis]").fill("2")
+    flight.locator("input[name=dis]").press("Enter")
+    expect(heads).to_contain_text("now x")
+    expect(flight.locator("input[name=dis]")).to_be_visible()
+    assert json.loads(exported(page, "JSON"))["uavs"][0]["dis"] == 2
+
+
 def test_names_from_files_never_become_markup(page, show):
     show(LOCAL)
     page.locator(".symbol.targets").first.click()

@@ -9,9 +9,10 @@ from problems import random_problem
 from stopping import at_once
 
 from app.domain.plan import Plan
+from app.domain.surroundings import Base
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
-from app.solvers.floor import Floor
+from app.solvers.floor import Floor, nothing_to_fly
 from app.solvers.greedy import greedy_plan
 from app.solvers.parameters import GreedyParameters
 from app.solvers.protocol import History, Progress, Proof, Solution, SolverContext
@@ -115,3 +116,46 @@ def test_where_nothing_can_be_flown_it_ends_at_once(name, change, unloading):
     if not ALGORITHMS[name].learns and name != "dqn":
         assert [(each.fraction, each.best_reward) for each in told] == [(1.0, 0.0)]
         assert solution.proof == Proof(0.0, True)
+
+
+def on_a_plane(bases, **of_the_uav):
+    """A problem of one UAV at 0, 0 and one area 10 away from it, with bases at some distances on the way."""
+    problem = generate("uniform", 1, 1, 1, np.random.default_rng(1))
+    at = {"x_s": 0.0, "y_s": 0.0, "x_c": 0.0, "y_c": 0.0, "speed": 1.0, "loadlist": (4.0,)}
+    uav = replace(problem.uavs[0], **{**at, **of_the_uav})
+    target = replace(problem.targets[0], x=10.0, y=0.0, loadlist=(4.0,), deadline=None, level=9.0)
+    objective = replace(problem.objective, return_to_base=False)
+    placed = tuple(Base(f"base-{x:g}", x, 0.0) for x in bases)
+    return replace(problem, uavs=(uav,), targets=(target,), bases=placed, objective=objective)
+
+
+@pytest.mark.parametrize("loading", ["refill", "planned"])
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_where_no_reload_brings_a_uav_to_an_area_it_ends_at_once(name, loading):
+    problem = on_a_plane([3.0], voyage=5.0)
+    unloading = "planned" if loading == "planned" else "greedy"
+    problem = replace(problem, objective=replace(problem.objective, loading=loading, unloading=unloading))
+    told = []
+    solver = create_solver(name, parse_parameters(name, {}), SolverContext(), keeps_checkpoint=False)
+    solution = solver.solve(problem, 3, never, told.append)
+    assert (solution.plan, solution.proof) == (Plan.empty(1, 1), Proof(0.0, True))
+    assert [(each.fraction, each.best_reward) for each in told] == [(1.0, 0.0)]
+
+
+def test_a_reload_that_brings_a_uav_to_an_area_is_found():
+    assert not nothing_to_fly(on_a_plane([3.0], voyage=7.0))
+    assert not nothing_to_fly(on_a_plane([3.0], voyage=7.0, loadlist=(0.0,), full_load=(4.0,)))
+    assert nothing_to_fly(on_a_plane([3.0], voyage=7.0, loadlist=(0.0,), full_load=(0.0,)))
+    assert nothing_to_fly(on_a_plane([3.0], voyage=7.0, ret=True))
+    charged_home = on_a_plane([3.0], voyage=5.0)
+    assert not nothing_to_fly(charged(charged_home))
+
+
+def test_what_a_uav_can_leave_at_a_base_counts_as_in_stock():
+    """With planned loads the first UAV, which cannot reach the area, brings the second one what it needs."""
+    problem = on_a_plane([3.0], voyage=7.0, loadlist=(0.0,))
+    bringer = replace(problem.uavs[0], id="bringer", voyage=3.0, loadlist=(4.0,))
+    empty = tuple(replace(base, stock=(0.0,)) for base in problem.bases)
+    objective = replace(problem.objective, loading="planned", unloading="planned")
+    problem = replace(problem, uavs=(*problem.uavs, bringer), bases=empty, objective=objective)
+    assert not nothing_to_fly(problem)

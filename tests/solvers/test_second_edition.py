@@ -17,6 +17,7 @@ from app.domain.records import problem_to_record
 from app.simulation.evaluation import reward_of
 from app.solvers.bound.upper_bound import upper_bound
 from app.solvers.exact import Exact
+from app.solvers.floor import nothing_to_fly
 from app.solvers.genetic import GeneticAlgorithm
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.solver import LocalSearch
@@ -95,6 +96,20 @@ def test_plans_are_legal_rewards_true_and_bounds_valid(draw, part):
             assert solution.proof.bound >= best - slack, number
             assert rewards["exact"] >= best - slack or not solution.proof.proven, number
     assert proven > (0.6 if draw is random_sorties else 0.9) * PROBLEMS
+
+
+def test_staying_at_home_is_the_best_plan_where_nothing_can_be_flown():
+    found = 0
+    for number in range(200):
+        problem = random_sorties(np.random.default_rng([7, number]), 3, 4)
+        if not nothing_to_fly(problem):
+            continue
+        found += 1
+        body = problem_to_record(problem)
+        best = best_plan(body, Legs(body))
+        at_home = reward_of(problem, Plan.empty(problem.n_uavs, problem.n_targets))
+        assert best is None or best <= at_home + REL, number
+    assert found > 20
 
 
 def earned(body: dict[str, Any], legs: Legs, problem: Problem, plan: Plan) -> float:

@@ -1,6 +1,7 @@
 /** A plan as the places that each UAV stops at, of visits and reloads, which are moved, added and removed by hand. No page, no requests. */
 
 import { called, placeNames } from "./plan.js";
+import { ruleText } from "./reasons.js";
 import { placeOf, placeOfAction, placesOf } from "./stops.js";
 import { t } from "./texts.js";
 
@@ -58,5 +59,5 @@ export function saidOfBreach(breach, problem) {
   const who = uav ? called(uav) : t("The plan");
   const where = breach.target_id === null ? who : t("{uav}, visit {step} ({area})", { uav: who, step: breach.step, area: placeNames(problem)(breach.target_id) });
   const figures = breach.needed === null ? "" : `: ${t("needs {needed}, has {had}", { needed: breach.needed, had: breach.had })}`;
-  return `${where}: ${breach.says}${figures}`;
+  return `${where}: ${ruleText(breach)}${figures}`;
 }

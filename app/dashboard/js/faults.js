@@ -1,5 +1,6 @@
 /** What the service says of a field of the problem, with the way to it. */
 
+import { fieldTitle } from "./columns.js";
 import { h } from "./dom.js";
 import { BASES, ZONES } from "./kinds.js";
 import { get, select, set } from "./state.js";
@@ -24,6 +25,6 @@ export function wayTo(pointer, problem) {
     const cell = [field, rest[0] ?? ""].map((each) => document.querySelector(`${row} td[data-column^="${CSS.escape(each)}"]`)).find(Boolean);
     cell?.focus();
   };
-  const where = id === undefined ? (PARTS[pointer] ?? pointer) : [id, rest[0]].filter(Boolean).join(", ");
+  const where = id === undefined ? (PARTS[pointer] ?? pointer) : [id, rest[0] && fieldTitle(kind, rest[0], problem.crs === "wgs84")].filter(Boolean).join(", ");
   return h("button", { type: "button", class: "quiet", dataset: { pointer }, onclick: go }, where);
 }

@@ -37,7 +37,8 @@ function delivered(problem, { asked, arrived }) {
 }
 
 /** How far from the best plan that there can be, where that was asked for. */
-function sureness({ bound, gap }) {
+function sureness({ bound, gap, proof }) {
+  if (proof?.proven) return figure("How sure", t("How sure"), t("the best that there is"), t("No plan earns more: that is proven."), true);
   if (typeof gap !== "number") return figure("How sure", t("How sure"), t("not proven"), typeof bound === "number" ? t("The bound says nothing here.") : t("Ask for the bound to know how good the best plan can be."), true);
   if (gap < LEAST_GAP) return figure("How sure", t("How sure"), t("the best that there is"), t("No plan earns more: that is proven."), true);
   return figure("How sure", t("How sure"), t("at least {share} % of the best", { share: shown(100 * (1 - gap), 3) }), t("No plan earns more than the bound: that is proven."), true);

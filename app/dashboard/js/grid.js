@@ -32,7 +32,7 @@ export class Grid {
   /**
    * Show items; rows of items that did not change are kept.
    * @param {object[]} items
-   * @param {{name: string, title: string, read: (item: object) => any, text?: boolean}[]} columns
+   * @param {{name: string, title: string, read: (item: object) => any, text?: boolean, flag?: boolean}[]} columns a flag is 1 or nothing, and is turned over instead of typed
    */
   show(items, columns) {
     const sameColumns = columns.map((c) => c.title).join() === this.columns.map((c) => c.title).join();
@@ -138,7 +138,7 @@ export class Grid {
   #row(item) {
     const cells = this.columns.map((column) => {
       const value = column.read(item);
-      return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" || column.text ? null : "num", dataset: { column: column.name } }, value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
+      return h("td", { role: "gridcell", tabindex: "-1", class: column.name === "id" || column.text ? null : "num", dataset: { column: column.name } }, column.flag ? (value ? "✓" : "") : value === undefined ? "" : typeof value === "number" ? shown(value, 8) : String(value));
     });
     const says = t("Delete {item}", { item: item.id });
     const remove = h("button", { type: "button", class: "quiet", tabindex: "-1", "aria-label": says, title: says }, "×");
@@ -182,6 +182,7 @@ export class Grid {
     if (!column || cell.querySelector("input")) return;
     const { id } = cell.parentElement.dataset;
     const value = column.read(this.rows.get(id).item);
+    if (column.flag) return this.options.onEdit(id, column, value ? "" : "1");
     const before = value === undefined ? "" : typeof value === "number" ? writtenNumber(value) : String(value);
     const was = [...cell.childNodes];
     const { row, column: at } = this.#place(cell);

@@ -21,6 +21,8 @@ export class Labels {
     this.widths = new Map();
     this.later = null;
     map.on("moveend zoomend resize viewreset", () => this.soon());
+    // At another zoom names are not where they were; a pan takes them along.
+    map.on("zoomend viewreset", () => this.pane.replaceChildren());
   }
 
   /** Lay them out once nothing has changed for a moment. */
@@ -43,7 +45,7 @@ export class Labels {
     const chosen = selection && this.markers.of(selection);
     const seen = [];
     for (const symbol of this.markers.symbols.values()) {
-      const at = this.map.latLngToLayerPoint(symbol.marker.getLatLng());
+      const at = this.map.latLngToLayerPoint(symbol.at);
       const [x, y, half] = [at.x + symbol.dx, at.y + symbol.dy, symbol.size / 2];
       if (!sight.contains(at.add(origin))) continue;
       taken.add({ left: x - half, top: y - half, right: x + half, bottom: y + half });

@@ -1,14 +1,13 @@
 /** Where land is (Natural Earth), below everything else on a map of the globe; without a network, as far as the service is there. */
 
-import { Bounds, DomUtil, Layer } from "../vendor/leaflet/leaflet.js";
+import { Bounds } from "../vendor/leaflet/leaflet.js";
 import { svg } from "./dom.js";
+import { Sheet } from "./sheet.js";
 import { ringsOf } from "./topology.js";
 
 const FOLDER = new URL("../vendor/world-atlas-2.0.2/", import.meta.url);
 /** From the zoom on at which a file is shown: that of 1 : 50 000 000, and that of 1 : 10 000 000. */
 const FILES = [[0, "land-50m.json.gz"], [7, "land-10m.json.gz"]];
-/** How much of the map's size is drawn beyond its edges, so that a pan shows land at once. */
-const BEYOND = 0.5;
 /** Points closer together than this, in pixels, are drawn as one. */
 const APART_PX = 0.7;
 
@@ -30,21 +29,11 @@ function load(file) {
 }
 
 /** A Leaflet layer of the land, as one path. */
-export const Land = Layer.extend({
-  onAdd(map) {
-    if (!map.getPane("land")) map.createPane("land").style.zIndex = 100;
+export const Land = Sheet.extend({
+  onAdd() {
     this._path = svg("path", { "fill-rule": "evenodd" });
     this._drawn = svg("svg", { class: "land leaflet-zoom-animated", "aria-hidden": "true" }, this._path);
-    map.getPane("land").append(this._drawn);
-    if (map._loaded) this._look();
-  },
-
-  onRemove() {
-    this._drawn.remove();
-  },
-
-  getEvents() {
-    return { moveend: this._look, resize: this._look, viewreset: this._look, zoom: this._follow, zoomanim: this._follow };
+    this._hang("land", 100);
   },
 
   getAttribution() {
@@ -61,22 +50,9 @@ export const Land = Layer.extend({
     if (shown !== file) load(file).then(() => this._map && this._look(), () => {});
   },
 
-  /** While the zoom changes, the drawing is stretched. */
-  _follow(event) {
-    if (!this._corner) return;
-    const zoom = event.zoom ?? this._map.getZoom();
-    const at = this._map._latLngToNewLayerPoint(this._corner, zoom, event.center ?? this._map.getCenter());
-    DomUtil.setTransform(this._drawn, at, this._map.getZoomScale(zoom, this._zoom));
-  },
-
   _draw(rings = []) {
     const map = this._map;
-    const size = map.getSize();
-    const origin = map.containerPointToLayerPoint(size.multiplyBy(-BEYOND)).round();
-    const extent = size.multiplyBy(1 + 2 * BEYOND).round();
-    this._corner = map.layerPointToLatLng(origin);
-    this._zoom = map.getZoom();
-    DomUtil.setTransform(this._drawn, origin, 1);
+    const { origin, extent } = this._cover();
     this._drawn.setAttribute("width", extent.x);
     this._drawn.setAttribute("height", extent.y);
     // The whole world is so many pixels wide at this zoom.

@@ -9,6 +9,7 @@ import { judgeDrafts } from "./drafting.js";
 import { redo, undo } from "./history.js";
 import { watchIntake } from "./intake.js";
 import { keepProblem, restore } from "./keep.js";
+import { showKeys } from "./keys_help.js";
 import { languageChoice } from "./language.js";
 import { DispatchMap } from "./map.js";
 import { lastOpen, openMission } from "./missions/feed.js";
@@ -138,6 +139,9 @@ function onKeys(event) {
   } else if (event.key === "Escape" && !typing) {
     map.stopPlacing();
     set({ selection: null });
+  } else if (event.key === "?" && !typing && !event.target.closest("table[role=grid]")) {
+    event.preventDefault();
+    showKeys();
   }
 }
 
@@ -207,6 +211,7 @@ async function start() {
   const asked = read(location.hash);
   makeKeyDialog();
   document.addEventListener("keydown", onKeys);
+  byId("keys").addEventListener("click", showKeys);
   subscribe(["problem", "problemName"], titleProblem);
   keepColours();
   judgeDrafts();

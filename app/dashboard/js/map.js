@@ -164,7 +164,7 @@ export class DispatchMap {
     this.labels = new Labels(this.map, this.markers, this.routes);
     addControls(this.map, () => this.fit());
     this.map.on("movestart zoomstart", () => { this.handled ||= !this.fitting; });
-    this.map.on("click", ({ latlng, originalEvent }) => this.#onClick(latlng, originalEvent));
+    this.map.on("click", ({ latlng, layerPoint, originalEvent }) => this.#onClick(latlng, originalEvent, layerPoint));
     this.map.on("dblclick", () => this.drawing?.finish());
   }
 
@@ -249,9 +249,10 @@ export class DispatchMap {
     this.corners.show(this.#shown().problem[ZONES]?.find((zone) => zone.id === id) ?? null, this.#editable(), this.shift);
   }
 
-  #onClick(latlng, event = null) {
+  #onClick(latlng, event = null, point = null) {
     if (this.drawing) return this.drawing.add(latlng);
     if (this.placing) return this.placing.take(this.placing.kind, this.#rounded(latlng));
+    if (point && this.markers.clickAt(point)) return;
     // The second click of the double click that ended a zone means nothing more.
     if (!(event?.detail > 1)) select(null);
   }

@@ -2,8 +2,10 @@
 
 import { h } from "./dom.js";
 import { wayTo } from "./faults.js";
+import { whyNobodyFlies } from "./reasons.js";
 import { get, subscribe } from "./state.js";
 import { t, tn } from "./texts.js";
+import { MOST_OF_A_CODE, warningText } from "./warnings.js";
 
 /** Whether the problem on screen is another than the one that the plan answers. */
 export function outOfDate() {
@@ -29,6 +31,16 @@ export function answeredBy({ algorithm, answered_by: by }) {
 export function warningsOf(answer, problem) {
   const { warnings = [] } = answer;
   if (!warnings?.length) return null;
+  const item = (warning) => h("li", { dataset: { code: warning.code }, title: warning.detail }, wayTo(warning.pointer, problem), ` ${warningText(problem, warning)}`);
+  const many = warnings.some(({ code }) => warnings.filter((each) => each.code === code).length >= MOST_OF_A_CODE);
   return h("section", { class: "warning", "data-testid": "warnings" }, h("h3", {}, tn(warnings.length, "Is this meant? One thing looks unusual", "Is this meant? {count} things look unusual")),
-    h("ul", { class: "violations" }, warnings.map(({ pointer, code, detail }) => h("li", { dataset: { code } }, wayTo(pointer, problem), ` ${detail}`))));
+    h("ul", { class: "violations" }, warnings.map(item)), many && h("p", {}, t("There may be more: of one kind {count} are listed at most.", { count: MOST_OF_A_CODE })));
+}
+
+/** Why nobody flies, where no plan could bring anything to anybody; null otherwise. */
+export function nobodyFlies(answer, problem) {
+  const why = whyNobodyFlies(problem, answer);
+  if (!why.length) return null;
+  return h("section", { class: "warning", id: "nobody-flies" }, h("h3", {}, t("Nobody flies: no plan brings anything to any area")),
+    h("ul", { class: "violations" }, why.map(({ count, says }) => h("li", {}, tn(count, "{count} area: {reason}", "{count} areas: {reason}", { reason: says })))));
 }

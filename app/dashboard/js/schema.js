@@ -49,6 +49,11 @@ export function isWords(schema) {
   return schema.type === "array" && schema.items?.type === "string";
 }
 
+/** Whether a field is a 1 or a 0 that says yes or no. */
+export function isFlag(schema) {
+  return schema.type === "integer" && schema.minimum === 0 && schema.maximum === 1;
+}
+
 /** Whether a field holds ids of the items of a list. */
 export function isIdsOf(schema, list) {
   return isWords(schema) && schema.idsOf === list;

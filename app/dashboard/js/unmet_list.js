@@ -6,6 +6,7 @@ import { amountsCell, amountsText } from "./materials.js";
 import { names } from "./plan.js";
 import { Portions } from "./portions.js";
 import { requestedBy } from "./problem.js";
+import { reasonText } from "./reasons.js";
 import { addVisit, allow, changeText, remedyText } from "./remedies.js";
 import { get, select, set, subscribe } from "./state.js";
 import { t, tn, tNodes } from "./texts.js";
@@ -26,7 +27,7 @@ export function unmetList(problem, plan, wanted, changing) {
       h("div", { class: "row spread" },
         h("button", { type: "button", class: "quiet", title: unmet.target_id, onclick: () => select({ kind: "targets", id: unmet.target_id }) }, nameOf(unmet.target_id)),
         h("span", { class: "lacks" }, tNodes("lacks {amounts} of {asked}", { amounts: h("strong", {}, amountsCell(problem, unmet.remaining)), asked: amountsText(problem, lacking) }))),
-      h("p", { class: "hint" }, unmet.reason), remedyOf(problem, unmet, changing));
+      h("p", { class: "hint", title: unmet.reason }, reasonText(problem, plan, unmet)), remedyOf(problem, unmet, changing));
   };
   const list = h("ul", { class: "unmet", id: "unmet" });
   const portions = new Portions(list, wanted, item, (button) => h("li", {}, button));

@@ -2,7 +2,7 @@
 
 import { h, notify, number } from "../dom.js";
 import { amountsCell } from "../materials.js";
-import { names } from "../plan.js";
+import { baseName, names } from "../plan.js";
 import { get } from "../state.js";
 import { t, tn, tNodes } from "../texts.js";
 import { brought } from "./doing.js";

@@ -2,6 +2,7 @@
 
 import { shortAmounts } from "../dom.js";
 import { baseName } from "../plan.js";
+import { ruleText } from "../reasons.js";
 import { listed, t, tn } from "../texts.js";
 
 const stopOf = (each) => each.target_id ?? baseName(each.base_id);
@@ -37,7 +38,7 @@ export function happened({ type, event, number }) {
 export function effectOf({ effect, passed_over: passed }) {
   if (passed) return tn(passed, "{count} was older than what is known", "{count} were older than what is known");
   if (!effect) return "";
-  const broken = effect.broken.map((each) => t("{uav} does not stop at {place}: {why}", { uav: each.uav_id, place: stopOf(each), why: each.says }));
+  const broken = effect.broken.map((each) => t("{uav} does not stop at {place}: {why}", { uav: each.uav_id, place: stopOf(each), why: ruleText(each) }));
   const late = effect.late.map((each) => t("{uav} is at {place} at {time}, not {planned}", { uav: each.uav_id, place: stopOf(each), time: each.arrival_time, planned: each.planned }));
   return [...broken, ...late].join("; ");
 }

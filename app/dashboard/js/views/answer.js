@@ -7,7 +7,7 @@ import { beginDraft, beginWith } from "../drafting.js";
 import { figures } from "../figures.js";
 import { Finder } from "../finder.js";
 import { editorOf, judgement } from "../plan_editor.js";
-import { answeredBy, staleNote, warningsOf } from "../plan_notes.js";
+import { answeredBy, nobodyFlies, staleNote, warningsOf } from "../plan_notes.js";
 import { registerView } from "../registry.js";
 import { routesTable } from "../routes_table.js";
 import { get, set, subscribe } from "../state.js";
@@ -67,7 +67,7 @@ registerView({
     let editor = null;
     const drawHead = ({ answer, answerProblem, draft }) => {
       if (draft) head.replaceChildren(stale, judgement(answerProblem, answer, draft));
-      else head.replaceChildren(stale, ...figures(answerProblem, answer), begins, source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), acts());
+      else head.replaceChildren(stale, ...[nobodyFlies(answer, answerProblem)].filter(Boolean), ...figures(answerProblem, answer), begins, source(answer), ...[warningsOf(answer, answerProblem)].filter(Boolean), acts());
     };
     const drawRoutes = ({ answer, answerProblem, draft }) => {
       long.routes = null;

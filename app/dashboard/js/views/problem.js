@@ -16,7 +16,7 @@ import { beyond, onEarth } from "../limits.js";
 import { edit, materials, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateText } from "../plan.js";
 import { registerView } from "../registry.js";
-import { amountsOf, isAmounts, isWords, itemFields } from "../schema.js";
+import { amountsOf, isAmounts, isFlag, isWords, itemFields } from "../schema.js";
 import { get, select, set, subscribe } from "../state.js";
 import { plainNumber, shown, t, writtenNumber } from "../texts.js";
 import { wordsIn, writtenWords } from "../words.js";
@@ -28,6 +28,8 @@ const KINDS = { uavs: t("UAVs"), targets: t("Areas"), [BASES]: t("Bases"), [ZONE
 /** Types of settings that have one value, and so one form field. */
 const SINGLE = ["number", "integer", "boolean", "string"];
 const PLACES = { local: t("on a plane"), wgs84: t("longitude, latitude") };
+/** Fields of UAVs that have left: where one is now, and what of its flight is behind it. */
+const IN_FLIGHT = new Set(["x_c", "y_c", "dis", "airborne"]);
 /** Tables to fill in, by what they are of. */
 const TEMPLATES = { targets: t("Template: areas"), uavs: t("Template: UAVs"), [BASES]: t("Template: bases") };
 
@@ -40,12 +42,22 @@ function columnsOf(kind, problem) {
   const held = ([name, schema]) => isAmounts(schema) && problem[kind]?.some((item) => kind === BASES || item[name]);
   const shownAs = (value, schema) => (value && isWords(schema) ? writtenWords(value) : value);
   const scalars = Object.entries(known).filter(plain).map(([name, schema]) => ({
-    name, title: fieldTitle(kind, name, globe), text: schema.type === "string" || isWords(schema), read: (item) => shownAs(item[name], schema),
+    name, title: fieldTitle(kind, name, globe), text: schema.type === "string" || isWords(schema), flag: isFlag(schema), read: (item) => shownAs(item[name], schema),
   }));
   const lists = Object.entries(known).filter(held).flatMap(([field]) => Array.from({ length: materials(problem) }, (_, k) => ({
     name: `${field}/${k}`, title: amountTitle(kind, field, k, globe), read: (item) => item[field]?.[k],
   })));
   return [...scalars, ...lists];
+}
+
+/** The columns of a table: what belongs to a flight is there once a UAV has left. */
+function tableColumns(kind, problem) {
+  const columns = columnsOf(kind, problem);
+  return kind === "uavs" && !problem.uavs.some(hasLeft) ? columns.filter(({ name }) => !IN_FLIGHT.has(name)) : columns;
+}
+
+function hasLeft(uav) {
+  return [...IN_FLIGHT].some((name) => uav[name]);
 }
 
 /** Take what was typed into a cell or field as the item's. */
@@ -117,7 +129,7 @@ function mountTables(dock) {
     const { problem } = get();
     for (const kind of Object.keys(KINDS)) {
       const items = problem[kind] ?? [];
-      grids[kind].show(items, columnsOf(kind, problem));
+      grids[kind].show(items, tableColumns(kind, problem));
       buttons[kind].textContent = `${KINDS[kind]} ${items.length}`;
     }
     mark();
@@ -201,13 +213,23 @@ function mountInspector(root) {
     if (!item) return root.replaceChildren(h("p", { class: "hint" }, t("Select a UAV, an area, a base or a zone on the map or in the table to see and change it.")));
     const { kind, id } = selection;
     const at = problem[kind].indexOf(item);
-    const fields = columnsOf(kind, problem).map((column) => {
+    const field = (column) => {
       const value = column.read(item);
+      const pointer = `/${kind}/${at}/${column.name}`;
+      if (column.flag) {
+        const box = h("input", { type: "checkbox", checked: Boolean(value), name: column.name, onchange: () => enter(kind, id, column.name, box.checked ? "1" : "") });
+        return labelled(column.title, box, { pointer });
+      }
       const input = h("input", { value: value === undefined ? "" : column.text ? value : writtenNumber(value), autocomplete: "off", spellcheck: "false", name: column.name, onchange: () => enter(kind, id, column.name, column.text ? input.value.trim() : plainNumber(input.value.trim())) });
-      return labelled(column.title, input, { pointer: `/${kind}/${at}/${column.name}` });
-    });
+      return labelled(column.title, input, { pointer });
+    };
+    const ofFlight = ({ name }) => kind === "uavs" && IN_FLIGHT.has(name);
+    const columns = columnsOf(kind, problem);
+    const fields = columns.filter((column) => !ofFlight(column)).map(field);
+    const flight = columns.filter(ofFlight);
+    const inFlight = flight.length > 0 && h("details", { open: hasLeft(item), dataset: { part: "flight" } }, h("summary", {}, t("In flight: where it is now, and what is flown")), h("div", { class: "grid3" }, flight.map(field)));
     const facts = kind === "uavs" ? t("{state}, range left {left} of {range}", { state: stateText(item), left: shown(rangeLeft(item), 6), range: shown(item.voyage, 6) }) : "";
-    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, t("Delete"))), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), kind === ZONES && cornersOf(item, problem)));
+    root.replaceChildren(h("div", { class: "card" }, h("div", { class: "row spread" }, h("h2", {}, id), h("button", { type: "button", class: "quiet danger", onclick: () => remove(kind, id) }, t("Delete"))), facts && h("p", { class: "hint" }, facts), kind === "uavs" && moreLike(item), h("div", { class: "grid3" }, fields), inFlight, kind === ZONES && cornersOf(item, problem)));
   };
   subscribe(["selection", "problem", "fields"], draw);
   draw();
