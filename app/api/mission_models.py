@@ -61,7 +61,9 @@ def _event_model(name: str, of: type) -> type[WireModel]:
         "type": (Literal[name], Field(description="What has happened")),
         "id": (
             Identifier,
-            Field(description="Your own; the same event with the same id again is not a second one"),
+            Field(
+                description="A name of your own for this event; told again with it, it is not a second one"
+            ),
         ),
     }
     if of is not events.Telemetry:

@@ -225,7 +225,7 @@ class AreaCancelledEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -243,7 +243,7 @@ class AreasAddedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -261,7 +261,7 @@ class AreasChangedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -429,7 +429,7 @@ class ClockEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -888,7 +888,7 @@ class LevelChangedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -1368,7 +1368,7 @@ class ProposalAcceptedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -1426,7 +1426,7 @@ class ProposalRefusedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -1539,7 +1539,7 @@ class ReloadDoneEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -1786,7 +1786,7 @@ class StockChangedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -1899,7 +1899,7 @@ class TelemetryEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
 
 @final
@@ -2013,7 +2013,7 @@ class UavDelayedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -2031,7 +2031,7 @@ class UavLostEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -2049,7 +2049,7 @@ class UavsAddedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -2170,7 +2170,7 @@ class VisitDoneEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -2222,7 +2222,7 @@ class WindChangedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a
@@ -2251,7 +2251,7 @@ class ZonesChangedEvent(TypedDict):
     """What has happened."""
 
     id: str
-    """Your own; the same event with the same id again is not a second one."""
+    """A name of your own for this event; told again with it, it is not a second one."""
 
     at: NotRequired[float | None]
     """When it became known, by the mission's clock, and not before that; default: at that clock, or when a

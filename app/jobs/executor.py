@@ -214,6 +214,10 @@ class Executor(ABC):
 
     async def start(self, on_ready: Callable[[], None]) -> None:
         """Begin to start the workers; ``on_ready`` is called for each, and for each that replaces one."""
+        _log.info(
+            "workers get ready; where nothing is compiled yet that takes minutes",
+            extra={"workers": self.capacity},
+        )
         self._keepers = [asyncio.create_task(self._keep_slot(on_ready)) for _ in range(self.capacity)]
 
     def submit(
@@ -268,7 +272,7 @@ class Executor(ABC):
 
     async def _live_once(self, on_ready: Callable[[], None]) -> bool:
         """Start one worker and stay until it is gone; False if it never became warm."""
-        worker = self._new_worker()
+        worker, begun = self._new_worker(), time.monotonic()
         self._workers.add(worker)
         try:
             await worker.warm_up()
@@ -276,6 +280,8 @@ class Executor(ABC):
                 self._ready.add(worker)
                 self.free.put_nowait(worker)
                 on_ready()
+                took = round(time.monotonic() - begun, 1)
+                _log.info("a worker is ready", extra={"worker": worker.name, "seconds": took})
                 await worker.stay()
                 if not self._closing.is_set():
                     _log.warning("a worker is gone and is replaced", extra={"worker": worker.name})

@@ -175,6 +175,10 @@ def test_warnings_are_in_the_notes_of_a_plan_file_and_in_the_briefing():
             assert f"   ! {warning}" in text
     assert [line[3:] for line in text.splitlines() if line[:1].isdigit()] == ["u0", "u1", "u2"]
     assert text.index("takes off at 0:01") < text.index("takes off at 0:02")
+    for each in flights:
+        for stop in each.flight.stops:
+            amounts = [f"{amount:g}" for amount in stop.delivered if amount]
+            assert f": unloads {amounts[0]}" in text
 
 
 def test_kml_has_flights_at_their_altitudes_areas_bases_and_zones():

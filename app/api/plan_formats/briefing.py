@@ -1,4 +1,4 @@
-"""What is read before the first take-off: all flights in their order, with altitudes, times and warnings."""
+"""What is read before the first take-off: flights in order, with altitudes, times, amounts and warnings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from app.api.plan_formats.altitudes import altitude_text
 from app.api.plan_formats.flown_plan import FlownPlan
 from app.api.plan_formats.launches import PlannedFlight
-from app.api.plan_formats.printed_text import called, position_text
+from app.api.plan_formats.printed_text import called, named_amounts_text, position_text
 from app.domain.clock import clock
 
 
@@ -47,7 +47,8 @@ def _flight(plan: FlownPlan, place: int, planned: PlannedFlight) -> Iterator[str
     for number, stop in enumerate(flight.stops):
         yield (
             f"   {clock(flight.arrives(number))} {called(stop.target)}, "
-            f"{position_text(plan, *stop.path[-1])}, {stop.range_left:.1f} km of range left{at(number)}"
+            f"{position_text(plan, *stop.path[-1])}: unloads {named_amounts_text(plan, stop.delivered)}, "
+            f"{stop.range_left:.1f} km of range left{at(number)}"
         )
     landing = flight.landing
     where = "where it started" if landing.base is None else f"at base {called(landing.base)}"

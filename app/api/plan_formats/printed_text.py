@@ -41,6 +41,16 @@ def amounts_text(amounts: tuple[float, ...]) -> str:
     return _BETWEEN.join(f"{amount:g}" for amount in amounts)
 
 
+def named_amounts_text(plan: FlownPlan, amounts: tuple[float, ...]) -> str:
+    """Write the amounts that are not 0, each with the name of its material where it has one."""
+    named = plan.problem.materials
+    names = [f" of {each.name}" for each in named] or [
+        f" of material {k}" if len(amounts) > 1 else "" for k in range(1, len(amounts) + 1)
+    ]
+    some = [f"{amount:g}{name}" for amount, name in zip(amounts, names, strict=True) if amount]
+    return ", ".join(some) or "nothing"
+
+
 def materials_text(plan: FlownPlan, title: str) -> str:
     """Write what stands above amounts: a title, and the names of the materials where they have any."""
     named = plan.problem.materials

@@ -50,7 +50,7 @@ def get_readiness(services: Served) -> Readiness:
         raise NotReady(f"the store does not answer: {type(error).__name__}") from error
     load = services.jobs.load()
     if load.ready == 0:
-        raise NotReady(f"none of {load.capacity} workers is warm yet")
+        raise NotReady(f"none of {load.capacity} workers is ready yet; the first start compiles for minutes")
     return Readiness(
         status="ready",
         workers_ready=load.ready,

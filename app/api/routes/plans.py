@@ -158,13 +158,13 @@ async def get_plan(
     format: Annotated[
         PlanFormat,
         Query(
-            description="geojson, csv, html (a page to print): the whole plan. load-sheet: CSV of what each "
+            description="html (a page to print), geojson, csv: the whole plan. load-sheet: CSV of what each "
             "UAV takes up before each flight. "
             "briefing (text), kml, gpx: all flights with their altitudes, times and warnings. "
             "qgc-plan (QGroundControl's .plan), qgc-wpl (QGC WPL 110 waypoints): "
             "flight files, one a flight. These five are for problems with crs wgs84"
         ),
-    ],
+    ] = PlanFormat.HTML,
     uav: Annotated[
         str | None,
         Query(
