@@ -258,17 +258,18 @@ function mountSettings(root) {
   const draw = () => {
     const { problem, fields } = get();
     const { crs, max_steps: steps, ...others } = fields.settings;
+    const globe = problem.crs === "wgs84";
     const mostKinds = Math.min(...amountsOf(fields.uavs).map((name) => fields.uavs[name].maxItems));
     const most = numeric("max_steps", problem.max_steps ?? steps.default, (count) => (Number.isInteger(count) ? edit(() => ({ max_steps: count })) : draw()));
     const kinds = numeric("materials", materials(problem), (count) => (count >= 1 && count <= mostKinds ? setMaterials(Math.trunc(count)) : draw()));
     const where = h("select", { name: "crs", onchange: () => edit(() => ({ crs: where.value })) }, crs.enum.map((value) => h("option", { value, selected: value === (problem.crs ?? crs.default) }, PLACES[value] ?? value)));
     const single = Object.fromEntries(Object.entries(others).filter(([, { type, enum: words }]) => words || SINGLE.includes(type)));
-    const further = new Fields(single, { pointer: "", values: problem, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
+    const further = new Fields(single, { pointer: "", values: problem, globe, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
     const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties, nullable }]) => {
       // What may be left out is not there while nothing of it is filled in.
       const taken = (values) => (nullable && !Object.keys(values).length ? undefined : values);
       const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, t("{object} {field}", { object: labelOf(name), field: inLine(labelOf(inner)) })])) : {};
-      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
+      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, globe, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
       return form.element;
     });
     root.replaceChildren(h("div", { class: "grid2" }, labelled(t("Positions"), where, { pointer: "/crs" }), labelled(t("Decision steps"), most, { pointer: "/max_steps" }), labelled(t("Kinds of material"), kinds, { pointer: "/materials" })), materialNaming(problem, fields), ...(further.fields.length ? [further.element] : []), ...own);
