@@ -91,7 +91,7 @@ def test_columns_are_assigned_by_hand_each_to_one_field(page, dialog):
     assert columns(dialog) == ["name", "latitude", "longitude", "need: n"]
     expect(dialog.locator("[data-says]:visible")).to_have_count(0)
     dialog.get_by_label("What the column n is").select_option(label="urgency")
-    expect(dialog.locator("[data-says=no-amounts]")).to_contain_text("No column is what the areas need")
+    expect(dialog.locator("[data-says=no-amounts]")).to_contain_text("No column says what the areas need")
     dialog.get_by_label("What the column b is").select_option(label="longitude")
     assert columns(dialog) == ["name", "longitude", "left out", "urgency"]
     expect(dialog.locator("[data-says=left-out]")).to_have_text("1 column is left out: l")
@@ -173,7 +173,7 @@ Laprak,28.222,84.799,3,,8,6,2,
 
 def test_needs_by_material_are_seen_named_and_taken_back(page, dialog):
     open_problem(page, {"crs": "wgs84", "uavs": [], "targets": []})
-    page.set_viewport_size({"width": 1280, "height": 800})
+    page.set_viewport_size({"width": 820, "height": 800})
     page.evaluate(PASTE, [VILLAGES, "body"])
     needs = ["need: water", "need: food", "need: medicine"]
     assert columns(dialog) == ["name", "latitude", "longitude", "urgency", "deadline", *needs, "left out"]

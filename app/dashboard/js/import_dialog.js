@@ -28,8 +28,8 @@ const FOUND = {
 };
 /** What is said where no column is an amount: one for all stands below. */
 const NO_AMOUNTS = {
-  targets: () => t("No column is what the areas need: each gets the need below. Choose a column above where there is one."),
-  uavs: () => t("No column is what the UAVs carry: each gets the load below. Choose a column above where there is one."),
+  targets: () => t("No column says what the areas need: each gets the need below. Choose a column above where there is one."),
+  uavs: () => t("No column says what the UAVs carry: each gets the load below. Choose a column above where there is one."),
 };
 /** Columns by names that the import knows in this language too. */
 const TEMPLATES = {
