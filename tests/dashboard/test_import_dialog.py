@@ -88,10 +88,13 @@ def test_an_example_that_nobody_changed_gives_way_to_a_list(browser, service):
 
 def test_columns_are_assigned_by_hand_each_to_one_field(page, dialog):
     choose(page, "ort;b;l;n\nDondo;-19,61;34,74;20\n")
-    assert columns(dialog) == ["name", "latitude", "longitude", "left out"]
+    assert columns(dialog) == ["name", "latitude", "longitude", "need: n"]
+    expect(dialog.locator("[data-says]:visible")).to_have_count(0)
     dialog.get_by_label("What the column n is").select_option(label="urgency")
+    expect(dialog.locator("[data-says=no-amounts]")).to_contain_text("No column says what the areas need")
     dialog.get_by_label("What the column b is").select_option(label="longitude")
     assert columns(dialog) == ["name", "longitude", "left out", "urgency"]
+    expect(dialog.locator("[data-says=left-out]")).to_have_text("1 column is left out: l")
     expect(dialog.get_by_role("alert")).to_contain_text("No column is latitude: choose it above")
     expect(dialog.get_by_role("button", name="Import")).to_be_disabled()
     dialog.get_by_label("What the column l is").select_option(label="latitude")
@@ -160,3 +163,46 @@ def test_a_template_comes_back_as_it_went(page, dialog):
     choose(page, saved.value.path().read_text("utf-8"))
     assert columns(dialog) == ["name", "start latitude", "start longitude", "speed", "range", "load 1"]
     expect(dialog.get_by_role("button", name="Import")).to_be_enabled()
+
+
+VILLAGES = """village,lat,lon,priority,deadline (h),water,food,medicine,remarks
+Barpak,28.205,84.742,3,1.0,10,8,4,by road
+Laprak,28.222,84.799,3,,8,6,2,
+"""
+
+
+def test_needs_by_material_are_seen_named_and_taken_back(page, dialog):
+    open_problem(page, {"crs": "wgs84", "uavs": [], "targets": []})
+    page.set_viewport_size({"width": 820, "height": 800})
+    page.evaluate(PASTE, [VILLAGES, "body"])
+    needs = ["need: water", "need: food", "need: medicine"]
+    assert columns(dialog) == ["name", "latitude", "longitude", "urgency", "deadline", *needs, "left out"]
+    expect(dialog.locator("[data-says=left-out]")).to_have_text("1 column is left out: remarks")
+    expect(dialog.locator("[data-says=no-amounts]")).to_be_hidden()
+    # Every column can be brought into sight, and the dialog itself does not move sideways.
+    last = dialog.get_by_label("What the column remarks is")
+    last.scroll_into_view_if_needed()
+    right = dialog.evaluate("(each) => each.getBoundingClientRect().right")
+    assert last.bounding_box()["x"] + last.bounding_box()["width"] <= right
+    assert dialog.evaluate("(each) => each.scrollWidth <= each.clientWidth")
+    page.set_viewport_size({"width": 1366, "height": 900})
+    dialog.get_by_role("button", name="Import").click()
+    problem = state(page, "problem")
+    assert [each["loadlist"] for each in problem["targets"]] == [[10, 8, 4], [8, 6, 2]]
+    heads = page.locator(".grid[data-kind=targets] thead th")
+    for need in needs:
+        expect(heads.filter(has_text=need)).to_have_count(1)
+    # The materials' names are fields among the settings.
+    page.locator("summary", has_text="Settings of the problem").click()
+    first = page.get_by_label("Name of material 1")
+    expect(first).to_have_value("water")
+    first.fill("Water, l")
+    first.press("Enter")
+    expect(heads.filter(has_text="need: Water, l")).to_have_count(1)
+    assert state(page, "problem")["materials"][0] == {"name": "Water, l"}
+    page.locator("body").press("Control+z")
+    page.locator(".notice", has_text="2 areas of what was pasted are here").get_by_role(
+        "button", name="Undo"
+    ).click()
+    expect(page.locator(".symbol.targets")).to_have_count(0)
+    assert state(page, "problem")["targets"] == []

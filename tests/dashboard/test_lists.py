@@ -18,13 +18,16 @@ _MAKE = """
         const sheet = readList(Uint8Array.from(Buffer.from(bytes, "base64")));
         if (!sheet) return null;
         const kind = places.kindOf(sheet);
-        const assigned = places.guess(sheet, places.choices(fields, kind, 3, true));
+        const before = how === "new" ? [] : (present.materials ?? []).map(({ name }) => name);
+        const assigned = places.guess(sheet, places.choices(fields, kind, 6, true), before);
+        const materials = places.materialsOf(sheet, assigned, before);
         const globe = places.degreesLikely(sheet, assigned);
-        const known = places.choices(fields, kind, 3, globe);
+        const known = places.choices(fields, kind, 6, globe, materials);
         const { items, faults } = places.itemsOf(sheet, assigned, known, otherwise);
-        const made = withItems(present, fields, kind, items, { how, crs });
+        const made = withItems(present, fields, kind, items, { how, crs, materials });
         const right = places.rightRow(sheet, assigned);
-        return { kind, assigned, globe, faults, ...made, right, told: sheet.notices };
+        const left = places.leftOut(sheet, assigned);
+        return { kind, assigned, globe, faults, ...made, right, left, told: sheet.notices };
     });
 """
 
@@ -197,3 +200,71 @@ def test_the_templates_of_each_language_are_read_as_they_are(make, language):
     assert areas["problem"]["targets"][1]["deadline"] == 3
     assert uavs["problem"]["uavs"][0]["voyage"] == 150
     assert bases["problem"]["bases"][0]["stock"] == [500]
+
+
+URGENCY = {"level": 1}
+VILLAGES = (
+    "village,lat,lon,priority,deadline (h),water,food,medicine\n"
+    "Barpak,28.205,84.742,3,1.0,10,8,4\nLaprak,28.222,84.799,3,,8,,2\n"
+)
+FLEET = "drone,lat,lon,speed,range,load medicine,charge en eau,Food (kg)\nA,28,84.6,50,90,1,2,3\n"
+
+
+def named(problem):
+    return [each.get("name") for each in problem.get("materials", [])]
+
+
+def test_columns_of_numbers_that_nothing_else_claims_are_needs_with_their_names(make):
+    found = make(VILLAGES, otherwise=URGENCY)
+    assert found["faults"] == []
+    targets = found["problem"]["targets"]
+    assert [each["loadlist"] for each in targets] == [[10, 8, 4], [8, 0, 2]]
+    assert [each.get("deadline") for each in targets] == [1, None]
+    assert (named(found["problem"]), found["left"]) == (["water", "food", "medicine"], [])
+
+
+def test_materials_of_a_second_list_are_found_by_their_names_in_whatever_order(make):
+    present = make(VILLAGES, otherwise=URGENCY)["problem"] | {"uavs": []}
+    present["materials"][0]["name"] = "Eau"
+    found = make(FLEET, how="add", present=present, otherwise={})
+    assert found["problem"]["uavs"][0]["loadlist"] == [2, 3, 1]
+    assert named(found["problem"]) == ["Eau", "food", "medicine"]
+    # A material that nothing had is one more, which the areas do not need.
+    more = make(FLEET.replace("Food", "tents"), how="add", present=present, otherwise={})["problem"]
+    assert more["uavs"][0]["loadlist"] == [2, 0, 1, 3]
+    assert named(more) == ["Eau", "food", "medicine", "tents"]
+    assert more["targets"][0]["loadlist"] == [10, 8, 4, 0]
+
+
+def test_materials_without_names_take_those_of_the_columns_and_keep_their_weights(make):
+    present = PRESENT_2 | {"materials": [{"weight": 2}, {"name": "food"}]}
+    found = make(
+        "name,lat,lon,need food,need water\nA,1,2,5,6\n", how="add", present=present, otherwise=URGENCY
+    )
+    assert found["problem"]["materials"] == [{"name": "water", "weight": 2}, {"name": "food"}]
+    assert found["problem"]["targets"][1]["loadlist"] == [6, 5]
+
+
+@pytest.mark.parametrize(
+    ("columns", "left"),
+    [
+        ("need,population", ["population"]),
+        ("need,households left", ["households left"]),
+        ("water,phone", ["phone"]),
+        ("water,no", ["no"]),
+    ],
+)
+def test_columns_that_are_no_amounts_stay_out_and_are_named(make, columns, left):
+    found = make(f"name,lat,lon,{columns},remarks\nA,1.5,2.5,7,12,none\n", otherwise=URGENCY)
+    assert found["left"] == [*left, "remarks"]
+    assert found["problem"]["targets"][0]["loadlist"] == [7]
+
+
+def test_columns_of_one_material_keep_what_tells_them_apart(make):
+    found = make("name,lat,lon,food (adults),food (children)\nA,1,2,3,4\n", otherwise=URGENCY)
+    assert named(found["problem"]) == ["food (adults)", "food (children)"]
+
+
+def test_a_row_without_any_amount_is_a_fault(make):
+    found = make("name,lat,lon,water,food\nA,1,2,3,\nB,1,2,,\n", otherwise=URGENCY)
+    assert found["faults"] == ["line 3: `need: water` is empty"]

@@ -194,7 +194,7 @@ def test_a_shape_that_is_given_up_or_crosses_itself_is_not_told(page, service):
     page.locator(".corner[data-corner='0']").press("Delete")
     form = page.locator("form[data-form=zones_changed]")
     expect(form).to_contain_text("3 corners")
-    form.get_by_role("button", name="Not so").click()
+    form.get_by_role("button", name="Cancel").click()
     expect(page.locator(".corner:not(.between, .whole)")).to_have_count(4)
     page.locator(".corner[data-corner='0']").press("Alt+ArrowDown")
     form.get_by_label("x of corner 1").fill("40")
@@ -253,4 +253,4 @@ def test_what_the_service_refuses_is_said_at_the_field(page, service):
     )
     assert "visit_done" not in mission.types()
     assert state(page, "untold") == []
-    page.get_by_role("button", name="Not so").click()
+    page.get_by_role("button", name="Cancel").click()

@@ -19,13 +19,14 @@ export function fieldTitle(kind, name, globe) {
   return (globe && ON_GLOBE[name]) || TITLES[kind][name] || inLine(labelOf(name));
 }
 
-/** What people call the amount of a kind of material, from 0. */
-export function amountTitle(kind, name, k, globe) {
-  return `${fieldTitle(kind, name, globe)} ${k + 1}`;
+/** What people call the amount of a kind of material, from 0. @param {(string | undefined)[]} [names] of the materials, where they have some */
+export function amountTitle(kind, name, k, globe, names) {
+  const field = fieldTitle(kind, name, globe);
+  return names?.[k] ? t("{field}: {material}", { field, material: names[k] }) : `${field} ${k + 1}`;
 }
 
 /** What people call a column of a table, which is a field or one of its amounts, `loadlist/0`. */
-export function columnTitle(kind, column, globe) {
+export function columnTitle(kind, column, globe, names) {
   const [field, k] = column.split("/");
-  return k === undefined ? fieldTitle(kind, field, globe) : amountTitle(kind, field, Number(k), globe);
+  return k === undefined ? fieldTitle(kind, field, globe) : amountTitle(kind, field, Number(k), globe, names);
 }

@@ -8,12 +8,13 @@ import { plainNumber, t, writtenNumber } from "./texts.js";
 /**
  * Fields of an object's schema.
  * @param {Record<string, object>} properties JSON schemas by name
- * @param {{pointer: string, values?: object, defs?: object, titles?: object, onchange?: () => void}} options
- *   pointer is the JSON pointer of the object in the request, by which refusals find the field
+ * @param {{pointer: string, values?: object, defs?: object, titles?: object, globe?: boolean, onchange?: () => void}} options
+ *   pointer is the JSON pointer of the object in the request, by which refusals find the field; `globe`: times are hours, lengths
+ *   kilometres and positions degrees
  */
 export class Fields {
-  constructor(properties, { pointer, values = {}, defs = {}, titles = {}, onchange = () => {} }) {
-    this.fields = Object.entries(properties).map(([name, schema]) => makeField(name, resolved(schema, defs), { pointer: `${pointer}/${name}`, value: values[name], title: titles[name], onchange }));
+  constructor(properties, { pointer, values = {}, defs = {}, titles = {}, globe = false, onchange = () => {} }) {
+    this.fields = Object.entries(properties).map(([name, schema]) => makeField(name, resolved(schema, defs), { pointer: `${pointer}/${name}`, value: values[name], title: titles[name], globe, onchange }));
     this.element = h("div", { class: "fields" }, this.fields.map((field) => field.element));
   }
 
@@ -52,29 +53,36 @@ export function labelled(title, input, { pointer, hint } = {}) {
   return h("label", { dataset: pointer ? { pointer } : {} }, title, input, hint && h("span", { class: "hint" }, hint), h("span", { class: "error", id, hidden: true }));
 }
 
-function makeField(name, schema, { pointer, value, title = labelOf(name), onchange }) {
+function makeField(name, schema, { pointer, value, title = labelOf(name), globe, onchange }) {
   const given = value ?? schema.default;
   const input = inputFor(schema, given);
   input.name = name;
   input.addEventListener("change", onchange);
-  const element = labelled(title, input, { pointer, hint: [forPeople(schema.description), range(schema)].filter(Boolean).join(". ") });
+  const element = labelled(title, input, { pointer, hint: [forPeople(schema.description, globe), range(schema)].filter(Boolean).join(". ") });
   return { name, element, read: () => valueOf(schema, input) };
 }
 
-/** A description in the API's words, where a field that is left empty is null. */
-function forPeople(description) {
-  return description?.replaceAll("null:", "empty:").replaceAll("`", "");
+/** A description in the API's words, where a field that is left empty is null; it has the units of both planes and the globe. */
+function forPeople(description, globe) {
+  const said = description?.replaceAll("null:", "empty:").replaceAll("`", "");
+  if (!globe) return said;
+  return said?.replace(/\b(?:distance units per time unit|distance units|time units|[xy]), or (?=km\/h|km|h\b|longitude|latitude)/g, "").replaceAll("time units", "hours");
 }
 
 /** A parameter's name for people: `time_limit_s` is “Time limit, s”. */
 export function titleOf(name) {
   const text = name.replace(/_s$/, ", s").replaceAll("_", " ");
-  return text[0].toUpperCase() + text.slice(1);
+  return asLabel(text);
 }
 
 /** The same in the language of the page. */
 export function labelOf(name) {
   return t(titleOf(name));
+}
+
+/** A text of a line as it stands alone. */
+export function asLabel(text) {
+  return text[0].toUpperCase() + text.slice(1);
 }
 
 /** A label as it stands in a line. */

@@ -13,10 +13,10 @@ export function present() {
   return Object.fromEntries(PARTS.map((part) => [part, state[part]]));
 }
 
-/** Replace what is on screen, with a way back to what it was. @param {object} patch of the store */
-export function change(patch) {
+/** Replace what is on screen, with a way back to what it was. @param {object} patch of the store @param {boolean} [always] also to a problem without anything in it */
+export function change(patch, always = false) {
   const { problem, answer, past } = get();
-  const worth = problem && (answer || problem.uavs.length || problem.targets.length);
+  const worth = problem && (always || answer || problem.uavs.length || problem.targets.length);
   // What was changed by hand belongs to the plan that it was made of.
   const draft = "answer" in patch && !("draft" in patch) ? { draft: null } : {};
   set({ violations: [], ...draft, ...patch, past: worth ? [...past, present()].slice(-MOST_UNDONE) : past, future: [] });

@@ -59,7 +59,7 @@ async function takeList(sheet, name) {
   if (!asked) return;
   const { kind, items, how } = asked;
   const { problem, notices } = withItems(get().problem, get().fields, kind, items, asked);
-  sayWithUndo([TOLD[kind](items.length, name), ...notices].join(". "), () => (how === "new" ? open(problem, withoutEnding(name)) : edit(() => problem)));
+  sayWithUndo([TOLD[kind](items.length, name), ...notices].join(". "), () => (how === "new" ? open(problem, withoutEnding(name), true) : edit(() => problem)));
 }
 
 export async function takeFile(file) {

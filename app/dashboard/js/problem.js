@@ -39,15 +39,15 @@ export function position(uav) {
 
 /** Kinds of material, K. */
 export function materials(problem) {
-  return (problem.uavs[0] ?? problem.targets[0])?.loadlist.length ?? 1;
+  return (problem.uavs[0] ?? problem.targets[0])?.loadlist.length ?? (problem.materials?.length || 1);
 }
 
-/** Bring another problem on screen; undoing brings back the one before with its plan. */
-export function open(problem, name) {
+/** Bring another problem on screen; undoing brings back the one before with its plan. @param {boolean} [always] also one without anything in it */
+export function open(problem, name, always = false) {
   change({
     problem: normalised(problem), problemName: name, opened: newOpening(), colours: {},
     answer: null, answerProblem: null, incumbent: null, selection: null,
-  });
+  }, always);
 }
 
 /** What tells one opening of a problem from all others. */
@@ -58,7 +58,7 @@ export function newOpening() {
 /** Replace the problem by an edited one, which can be undone. */
 export function edit(changed) {
   const { problem } = get();
-  change({ problem: { ...problem, ...changed(problem) } });
+  change({ problem: { ...problem, ...changed(problem) } }, true);
 }
 
 /** Change fields of a UAV, area, base or zone; undefined takes a field out. @param {"uavs"|"targets"|"bases"|"no_fly_zones"} kind */
@@ -148,6 +148,14 @@ function reach(problem) {
 /** Give every UAV, area and base so many kinds of material. */
 export function setMaterials(count) {
   edit((problem) => withMaterials(problem, get().fields, count));
+}
+
+/** Give a kind of material, from 0, a name; an empty one takes it away. */
+export function nameMaterial(k, name) {
+  edit((problem) => {
+    const list = Array.from({ length: materials(problem) }, (_, at) => problem.materials?.[at] ?? {}).with(k, present({ ...problem.materials?.[k], name: name || undefined }));
+    return { materials: list.some((each) => Object.keys(each).length) ? list : undefined };
+  });
 }
 
 /** A problem with so many kinds of material; amounts of those that come are 0. */

@@ -15,9 +15,19 @@ const WORDS = {
   voyage: ["range", "voyage", "reach", "autonomie", "portee", "rayon", "alcance", "autonomia"],
 };
 
+/** Words of columns that number, date or describe a place, and are no amounts of a material. */
+const NO_AMOUNTS = new Set(["no", "nr", "num", "number", "numero", "row", "line", "index", "fid", "objectid", "gid", "uuid", "key", "cle", "clave", "chave", "zip", "postcode", "phone", "tel", "telephone", "telefone", "telefono", "year", "annee", "ano", "date", "fecha", "data", "time", "population", "pop", "populacao", "poblacion", "households", "elevation", "altitude", "altitud", "distance", "distancia"]);
+/** Words between that of an amount and its material, as in `besoin en eau`. */
+const JOINING = new Set(["of", "for", "en", "de", "du", "des", "da", "do", "del", "la", "le", "les"]);
+
+/** A text in lower case, without accents. */
+export function plainName(text) {
+  return text.normalize("NFD").replace(/\p{M}/gu, "").toLowerCase();
+}
+
 /** What a name of a column says: its words, and the number at its end if it has one. */
 function wordsOf(name) {
-  const plain = name.normalize("NFD").replace(/\p{M}/gu, "").toLowerCase();
+  const plain = plainName(name);
   const number = /(?:^|[^\d])([1-9]\d?)$/.exec(plain)?.[1];
   return { words: plain.split(/[^a-z]+/).filter(Boolean), number: number ? Number(number) : null };
 }
@@ -33,4 +43,26 @@ export function meant(name) {
   const is = (known) => ([, each]) => each.some((word) => known.includes(word));
   const [field] = (whole in WORDS && [whole]) || Object.entries(WORDS).find(is([whole])) || Object.entries(WORDS).find(is(words)) || [];
   return field ? { field, number } : null;
+}
+
+/** Whether a column of numbers may be amounts of a material: its name says nothing else. @param {string} name of a column */
+export function mayBeAmounts(name) {
+  const { field } = meant(name) ?? {};
+  return (!field || field === "amount") && !wordsOf(name).words.some((word) => NO_AMOUNTS.has(word));
+}
+
+/**
+ * The material that a name of a column of amounts says, without the words of an amount and what is in brackets.
+ * @param {string} name of a column, as `Need water (l)`
+ * @returns {string} "" where it says none
+ */
+export function materialOf(name) {
+  const words = name.replace(/\([^)]*\)|\[[^\]]*\]/g, " ").split(/[\s_:;,./-]+/).filter(Boolean);
+  const left = words.filter((word) => !WORDS.amount.includes(plainName(word)));
+  if (left.length < words.length) {
+    while (left.length && JOINING.has(plainName(left[0]))) left.shift();
+    if (left.length) left[0] = left[0].replace(/^d['\u2019](?=.)/i, "");
+  }
+  const material = left.join(" ");
+  return /\p{L}/u.test(material) ? material : "";
 }

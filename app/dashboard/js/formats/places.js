@@ -9,7 +9,7 @@ import { wordsIn } from "../words.js";
 import { list, NUMBER, Numbers, plainText, rowText } from "./cells.js";
 import { FormatError } from "./error.js";
 import { nameOf, onGlobe, placeOf } from "./geojson.js";
-import { meant } from "./names.js";
+import { materialOf, mayBeAmounts, meant, plainName } from "./names.js";
 
 /**
  * A list as it was found.
@@ -78,14 +78,15 @@ function isNumber(cell) {
  * @param {"uavs"|"targets"|"bases"} kind
  * @param {number} count kinds of material
  * @param {boolean} globe whether positions are degrees
+ * @param {(string | undefined)[]} [materials] their names, where they have some
  * @returns {{name: string, title: string, schema: object, needed: boolean}[]} of amounts `loadlist/0`, `loadlist/1`, …
  */
-export function choices(fields, kind, count, globe) {
+export function choices(fields, kind, count, globe, materials) {
   const of = itemFields(fields, kind);
   const carried = amountsOf(of)[0];
   const taken = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
   const single = Object.entries(of).filter(taken).map(([name, schema]) => ({ name, title: fieldTitle(kind, name, globe), schema: onEarth(name, schema, globe), needed: schema.needed }));
-  const amounts = Array.from({ length: count }, (_, k) => ({ name: `${carried}/${k}`, title: amountTitle(kind, carried, k, globe), schema: of[carried].items, needed: of[carried].needed && k === 0 }));
+  const amounts = Array.from({ length: count }, (_, k) => ({ name: `${carried}/${k}`, title: amountTitle(kind, carried, k, globe, materials), schema: of[carried].items, needed: of[carried].needed && k === 0 }));
   return [...single, ...amounts];
 }
 
@@ -110,24 +111,69 @@ function valueOf(cell = "") {
   return Number(cell.trim().replace("\u2212", "-").replace(",", "."));
 }
 
+/** Whether a field is one amount of a material. @param {string | null} name as `choices` gives it */
+function isAmount(name) {
+  return Boolean(name?.includes("/"));
+}
+
+/**
+ * The names of the materials that a list brings.
+ * @param {Sheet} sheet
+ * @param {(string | null)[]} assigned a field a column
+ * @param {(string | undefined)[]} before names that materials have already, and keep
+ * @returns {(string | undefined)[]} by material; a name that another column has too is with what is in brackets behind it
+ */
+export function materialsOf({ columns }, assigned, before) {
+  const names = [...before];
+  const short = columns.map(materialOf);
+  const twice = (at) => short.some((name, other) => other !== at && isAmount(assigned[other]) && plainName(name) === plainName(short[at]));
+  columns.forEach((column, at) => {
+    if (!isAmount(assigned[at])) return;
+    const k = Number(assigned[at].split("/")[1]);
+    names[k] ||= short[at] && (twice(at) ? column : short[at]) || undefined;
+  });
+  return Array.from(names);
+}
+
+/**
+ * Fields that are needed and that no column is. An amount of one material is enough: of the others there is none.
+ * @param {ReturnType<typeof choices>} known fields
+ * @param {(string | null)[]} assigned a field a column
+ */
+export function missingOf(known, assigned) {
+  return known.filter(({ name, needed }) => needed && !assigned.includes(name) && !(isAmount(name) && assigned.some(isAmount)));
+}
+
+/** Columns that are no field and have something in a row: their names, or their numbers from 1. @param {Sheet} sheet @param {(string | null)[]} assigned @returns {string[]} */
+export function leftOut({ columns, rows }, assigned) {
+  return columns.flatMap((column, at) => (assigned[at] === null && rows.some(({ cells }) => (cells[at] ?? "").trim()) ? [column || String(at + 1)] : []));
+}
+
 /**
  * Guess what the columns are.
  * @param {Sheet} sheet
  * @param {ReturnType<typeof choices>} known fields, with more amounts than the list has columns
+ * @param {(string | undefined)[]} [materials] names of materials that there are already; columns named so are their amounts
  * @returns {(string | null)[]} a field a column, each once
  */
-export function guess({ columns, rows }, known) {
+export function guess({ columns, rows }, known, materials = []) {
   const names = new Set(known.map(({ name }) => name));
   const place = (axis) => [axis, `${axis}_s`].find((name) => names.has(name));
   const carried = known.find(({ name }) => name.endsWith("/0"))?.name.slice(0, -2);
   const assigned = columns.map(() => null);
   const assign = (at, name) => { if (at >= 0 && name && names.has(name) && !assigned.includes(name)) assigned[at] = name; };
-  const free = () => known.find(({ name }) => name.startsWith(`${carried}/`) && !assigned.includes(name))?.name;
+  const own = columns.map(materialOf);
+  const placeOfMaterial = (at) => materials.findIndex((name) => name && own[at] && plainName(name) === plainName(own[at]));
+  // A material of another name than those that there are is one more.
+  const free = (at) => known.find(({ name }) => name.startsWith(`${carried}/`) && !assigned.includes(name) && !(own[at] && materials[Number(name.split("/")[1])]))?.name;
+  const amounts = (at) => { const k = placeOfMaterial(at); assign(at, k >= 0 ? `${carried}/${k}` : free(at)); };
+  columns.forEach((column, at) => { if (mayBeAmounts(column) && placeOfMaterial(at) >= 0 && holds(at, isNumber)) amounts(at); });
   columns.forEach((column, at) => {
+    if (assigned[at] !== null) return;
     if (names.has(column.toLowerCase())) return assign(at, column.toLowerCase());
     const { field, number } = meant(column) ?? {};
     if (field === "x" || field === "y") assign(at, place(field));
-    else if (field === "amount") assign(at, number ? `${carried}/${number - 1}` : free());
+    else if (field === "amount") { if (number) assign(at, `${carried}/${number - 1}`); else amounts(at); }
     else assign(at, field);
   });
   // What the names do not say, the values may: a text is a name, two numbers are latitude and longitude, in this order.
@@ -142,8 +188,16 @@ export function guess({ columns, rows }, known) {
     assign(first, place(wide ? "x" : "y"));
     assign(left(coordinate), place(wide ? "y" : "x"));
   }
-  if (headless) assign(left(isNumber), free());
+  // A column that is called a need and names no material is all that is needed; else each one of numbers is a material.
+  if (columns.some((column, at) => isAmount(assigned[at]) && !own[at])) return assigned;
+  columns.forEach((column, at) => { if (assigned[at] === null && mayBeAmounts(column) && holds(at, isNumber)) amounts(at); });
   return assigned;
+
+  /** Whether all that is filled in of a column is so, and something is. */
+  function holds(at, so) {
+    const filled = rows.map(({ cells }) => (cells[at] ?? "").trim()).filter(Boolean);
+    return filled.length > 0 && filled.every(so);
+  }
 }
 
 /**
@@ -156,9 +210,10 @@ export function guess({ columns, rows }, known) {
  */
 export function itemsOf({ columns, rows, separator, row }, assigned, known, otherwise) {
   const fields = assigned.map((name) => known.find((each) => each.name === name) ?? null);
-  const missing = known.filter(({ name, needed }) => needed && !assigned.includes(name) && otherwise[name] === undefined);
+  const missing = missingOf(known, assigned).filter(({ name }) => otherwise[name] === undefined);
   if (missing.length) return { items: [], faults: [t("No column is {fields}: choose it above", { fields: missing.map(({ title }) => title).join(", ") })] };
   const numbers = new Numbers(separator, row);
+  const amount = known.find(({ name, needed }) => needed && isAmount(name));
   const faults = [];
   const items = rows.flatMap(({ line, cells }) => {
     try {
@@ -168,8 +223,9 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
         if (!field) return;
         const value = read((cells[at] ?? "").trim(), field, line, columns[at] ? `${field.title} (${columns[at]})` : field.title);
         if (value !== undefined) put(item, field.name, value);
-        else if (field.needed && otherwise[field.name] === undefined) throw new FormatError(t("{row}: `{column}` is empty", { row: rowText(row, line), column: field.title }));
+        else if (field.needed && !isAmount(field.name) && otherwise[field.name] === undefined) refuseEmpty(line, field.title);
       });
+      if (amount && !item[amount.name.split("/")[0]]) refuseEmpty(line, fields.find((field) => isAmount(field?.name)).title);
       return [item];
     } catch (error) {
       if (!(error instanceof FormatError)) throw error;
@@ -187,6 +243,10 @@ export function itemsOf({ columns, rows, separator, row }, assigned, known, othe
     const limit = beyond(value, schema);
     if (limit) refuse(line, column, text, limit);
     return value;
+  }
+
+  function refuseEmpty(line, column) {
+    throw new FormatError(t("{row}: `{column}` is empty", { row: rowText(row, line), column }));
   }
 
   function refuse(line, column, text, why) {

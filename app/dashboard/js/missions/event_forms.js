@@ -1,7 +1,8 @@
 /** Forms of what can happen in a mission, a function each: its title, its fields, and the event that it makes of them. */
 
+import { fieldTitle } from "../columns.js";
 import { h } from "../dom.js";
-import { Fields, labelled } from "../fields.js";
+import { asLabel, Fields, labelled } from "../fields.js";
 import { BASES, ZONES } from "../kinds.js";
 import { called, sum } from "../plan.js";
 import { freeId } from "../problem.js";
@@ -13,7 +14,6 @@ import { stopsAhead } from "./doing.js";
 const SINGLE = new Set(["number", "integer", "boolean", "string"]);
 /** Fields of UAVs and areas that the mission itself keeps, or that say what an item is and not how it is. */
 const KEPT = new Set(["id", "x_c", "y_c", "dis", "ret", "airborne", "available_from"]);
-const TITLES = { x_s: t("Start x"), y_s: t("Start y"), voyage: t("Range"), level: t("Urgency") };
 
 /** A choice among items, told apart by their ids. */
 function choice(title, name, items, chosen) {
@@ -37,7 +37,9 @@ function amounts(title, pointer, values, problem) {
 /** All single fields of an item, with what it has; what the forms have no field for stays as it is. */
 function itemForm(list, item, pointer, problem, needs) {
   const schemas = Object.fromEntries(Object.entries(itemFields(get().fields, list)).filter(([name, schema]) => SINGLE.has(schema.type) && !KEPT.has(name)));
-  const fields = new Fields(schemas, { pointer, values: item, titles: TITLES });
+  const globe = problem.crs === "wgs84";
+  const titles = Object.fromEntries(Object.keys(schemas).map((name) => [name, asLabel(fieldTitle(list, name, globe))]));
+  const fields = new Fields(schemas, { pointer, values: item, titles, globe });
   const load = amounts(needs, `${pointer}/loadlist`, item.loadlist, problem);
   const [plain, further] = [fields.fields.filter(({ name }) => item[name] !== undefined || schemas[name].needed), fields.fields.filter(({ name }) => item[name] === undefined && !schemas[name].needed)];
   const element = h("div", { class: "block" }, load.element, plain.map((field) => field.element), h("details", {}, h("summary", {}, t("Further fields")), h("div", { class: "fields" }, further.map((field) => field.element))));
@@ -108,7 +110,7 @@ function areasChanged({ target_id: id }, { state: { problem } }) {
     const { requested: _, ...now } = form.read();
     return { type: "areas_changed", targets: [now] };
   };
-  return { title: t("{area} is found otherwise", { area: called(before) }), says: t("What it needs is what it needs still, beside what it has got."), parts: [form], read };
+  return { title: t("{area}: need or place changed", { area: called(before) }), says: t("What it needs is what it needs still, beside what it has got."), parts: [form], read };
 }
 
 function areaCancelled({ target_id: id }) {

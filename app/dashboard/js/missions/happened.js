@@ -15,7 +15,7 @@ import { ZoneShapes } from "./zone_shapes.js";
 /** What can happen to an item of each list: the type of the event, and what its button says. */
 const OF = {
   uavs: [["visit_done", t("Visit done")], ["reload_done", t("Reload done")], ["uav_delayed", t("Delayed")], ["uav_lost", t("Lost")]],
-  targets: [["visit_done", t("Visit done")], ["level_changed", t("Urgency")], ["areas_changed", t("Found otherwise")], ["area_cancelled", t("Cancelled")]],
+  targets: [["visit_done", t("Visit done")], ["level_changed", t("Urgency")], ["areas_changed", t("Need or place changed")], ["area_cancelled", t("Cancelled")]],
   [BASES]: [["reload_done", t("Reload done")], ["stock_changed", t("Stock")]],
   [ZONES]: [["zones_changed", t("Open again")]],
 };
@@ -47,6 +47,11 @@ export class Happened {
       h("div", { class: "row" }, placing("targets", "areas_added", t("Place a new area")), placing("uavs", "uavs_added", t("Place a new UAV")), zone.button,
         h("button", { type: "button", onclick: () => this.open("wind_changed", {}) }, t("Wind"))),
       zone.steps);
+  }
+
+  /** Bring what can happen to what is selected into sight. */
+  reveal() {
+    this.acts.scrollIntoView({ block: "nearest" });
   }
 
   /** Offer what can happen to what is selected. */
@@ -81,7 +86,7 @@ export class Happened {
     const form = h("form", { class: "block", novalidate: true, "aria-label": title, dataset: { form: type } },
       h("h4", {}, title), says && h("p", { class: "hint" }, says), parts.map(({ element }) => element),
       labelled(t("When it became known"), at, { pointer: "/at", hint: t("By the mission's clock; empty: now") }), others,
-      h("div", { class: "row" }, send, h("button", { type: "button", class: "quiet", onclick: () => this.close() }, t("Not so"))));
+      h("div", { class: "row" }, send, h("button", { type: "button", class: "quiet", onclick: () => this.close() }, t("Cancel"))));
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.#tell(form, send, others, { ...read(), ...(at.value === "" ? {} : { at: Number(at.value) }) });

@@ -65,7 +65,7 @@ function makeForm() {
     event.preventDefault();
     const { job, problem } = get();
     const none = ["uavs", "targets"].filter((kind) => !problem[kind].length);
-    if (none.length) set({ violations: none.map((kind) => ({ pointer: `/${kind}`, detail: t("none yet: place at least one on the map") })) });
+    if (none.length) set({ violations: none.map((kind) => ({ pointer: `/${kind}`, detail: t("none yet: place at least one on the map, or import a list") })) });
     else if (!running(job)) allocate({ algorithm: choice.value, parameters: parameters.values(), ...limits.values(), ...(learns() ? keeping.values() : {}) });
   });
   const enable = () => {

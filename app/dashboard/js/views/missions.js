@@ -35,7 +35,7 @@ function mount(root, context) {
   parts = {
     dock: context.dock, list, untold,
     clock: new ClockCard(look), proposals: new Proposals(() => draw()), happened: new Happened(map, moment), log: new Log(),
-    title: h("h2", { tabindex: "-1" }), tables: missionTables(tellOf), body: h("div", { class: "block", hidden: true }),
+    title: h("h2", { tabindex: "-1" }), tables: missionTables(tellOf, () => parts.happened.reveal()), body: h("div", { class: "block", hidden: true }),
     link: h("span", { class: "chip", role: "status", "data-testid": "mission-link" }),
     says: h("p", { class: "error", role: "alert", hidden: true, "data-testid": "mission-trouble" }),
     cards: h("div", { class: "block" }),

@@ -13,7 +13,8 @@ import { templateOf } from "../import_dialog.js";
 import { bring, NOT_SAID, said, takeFile } from "../intake.js";
 import { BASES, ZONES } from "../kinds.js";
 import { beyond, onEarth } from "../limits.js";
-import { edit, materials, remove, setMaterials, update } from "../problem.js";
+import { materialNames } from "../materials.js";
+import { edit, materials, nameMaterial, remove, setMaterials, update } from "../problem.js";
 import { rangeLeft, stateText } from "../plan.js";
 import { registerView } from "../registry.js";
 import { amountsOf, isAmounts, isFlag, isWords, itemFields } from "../schema.js";
@@ -36,6 +37,7 @@ const TEMPLATES = { targets: t("Template: areas"), uavs: t("Template: UAVs"), [B
 /** Columns of numbers, words and texts, and of amounts one a material where an item has some. */
 function columnsOf(kind, problem) {
   const globe = problem.crs === "wgs84";
+  const names = materialNames(problem);
   const known = get().fields ? itemFields(get().fields, kind) : {};
   const plain = ([, schema]) => ["number", "integer", "string"].includes(schema.type) || isWords(schema);
   // Without a stock a base has as much as is asked for, so that there is always a place to write one.
@@ -45,7 +47,7 @@ function columnsOf(kind, problem) {
     name, title: fieldTitle(kind, name, globe), text: schema.type === "string" || isWords(schema), flag: isFlag(schema), read: (item) => shownAs(item[name], schema),
   }));
   const lists = Object.entries(known).filter(held).flatMap(([field]) => Array.from({ length: materials(problem) }, (_, k) => ({
-    name: `${field}/${k}`, title: amountTitle(kind, field, k, globe), read: (item) => item[field]?.[k],
+    name: `${field}/${k}`, title: amountTitle(kind, field, k, globe, names), read: (item) => item[field]?.[k],
   })));
   return [...scalars, ...lists];
 }
@@ -60,6 +62,11 @@ function hasLeft(uav) {
   return [...IN_FLIGHT].some((name) => uav[name]);
 }
 
+/** What people call a column of a table of a problem. */
+function titleIn(problem, kind, name) {
+  return columnTitle(kind, name, problem.crs === "wgs84", materialNames(problem));
+}
+
 /** Take what was typed into a cell or field as the item's. */
 function enter(kind, id, name, text) {
   const item = get().problem[kind].find((each) => each.id === id);
@@ -70,12 +77,12 @@ function enter(kind, id, name, text) {
   const schema = itemFields(get().fields, kind)[name];
   if (schema && isWords(schema)) {
     const words = text === "" ? undefined : wordsIn(text);
-    return words === null ? notify(t("{field} of {item} needs words with semicolons between", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error") : update(kind, id, { [name]: words });
+    return words === null ? notify(t("{field} of {item} needs words with semicolons between", { field: titleIn(get().problem, kind, name), item: id }), "error") : update(kind, id, { [name]: words });
   }
   if (schema?.type === "string") return update(kind, id, { [name]: text || undefined });
   const [field, k] = name.split("/");
   const value = text === "" ? undefined : Number(text.replace("−", "-"));
-  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(t("{field} of {item} needs a number", { field: columnTitle(kind, name, get().problem.crs === "wgs84"), item: id }), "error");
+  if (Number.isNaN(value) || (value === undefined && itemFields(get().fields, kind)[field].needed)) return notify(t("{field} of {item} needs a number", { field: titleIn(get().problem, kind, name), item: id }), "error");
   if (k === undefined || value === undefined) update(kind, id, { [field]: value });
   else {
     // Amounts that were not set are those of the load until then; a base has none.
@@ -235,26 +242,37 @@ function mountInspector(root) {
   draw();
 }
 
+/** A field a kind of material for its name. */
+function materialNaming(problem, fields) {
+  const { maxLength } = itemFields(fields, "materials").name;
+  const field = (k) => {
+    const input = h("input", { name: `materials/${k}/name`, value: problem.materials?.[k]?.name ?? "", maxlength: String(maxLength), autocomplete: "off", spellcheck: "false", onchange: () => nameMaterial(k, input.value.trim()) });
+    return labelled(t("Name of material {number}", { number: k + 1 }), input, { pointer: `/materials/${k}/name` });
+  };
+  return h("div", { class: "grid3", dataset: { part: "materials" } }, Array.from({ length: materials(problem) }, (_, k) => field(k)));
+}
+
 /** Settings of the problem, from the service's own description. */
 function mountSettings(root) {
   const numeric = (name, value, take) => h("input", { value: String(value), inputmode: "numeric", name, onchange: (event) => take(Number(event.target.value)) });
   const draw = () => {
     const { problem, fields } = get();
     const { crs, max_steps: steps, ...others } = fields.settings;
+    const globe = problem.crs === "wgs84";
     const mostKinds = Math.min(...amountsOf(fields.uavs).map((name) => fields.uavs[name].maxItems));
     const most = numeric("max_steps", problem.max_steps ?? steps.default, (count) => (Number.isInteger(count) ? edit(() => ({ max_steps: count })) : draw()));
     const kinds = numeric("materials", materials(problem), (count) => (count >= 1 && count <= mostKinds ? setMaterials(Math.trunc(count)) : draw()));
     const where = h("select", { name: "crs", onchange: () => edit(() => ({ crs: where.value })) }, crs.enum.map((value) => h("option", { value, selected: value === (problem.crs ?? crs.default) }, PLACES[value] ?? value)));
     const single = Object.fromEntries(Object.entries(others).filter(([, { type, enum: words }]) => words || SINGLE.includes(type)));
-    const further = new Fields(single, { pointer: "", values: problem, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
+    const further = new Fields(single, { pointer: "", values: problem, globe, onchange: () => edit(() => ({ ...Object.fromEntries(Object.keys(single).map((name) => [name, undefined])), ...further.values() })) });
     const own = Object.entries(others).filter(([, { properties }]) => properties).map(([name, { properties, nullable }]) => {
       // What may be left out is not there while nothing of it is filled in.
       const taken = (values) => (nullable && !Object.keys(values).length ? undefined : values);
       const titles = nullable ? Object.fromEntries(Object.keys(properties).map((inner) => [inner, t("{object} {field}", { object: labelOf(name), field: inLine(labelOf(inner)) })])) : {};
-      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
+      const form = new Fields(properties, { pointer: `/${name}`, values: problem[name], titles, globe, onchange: () => edit(() => ({ [name]: taken(form.values()) })) });
       return form.element;
     });
-    root.replaceChildren(h("div", { class: "grid2" }, labelled(t("Positions"), where, { pointer: "/crs" }), labelled(t("Decision steps"), most, { pointer: "/max_steps" }), labelled(t("Kinds of material"), kinds, { pointer: "/materials" })), ...(further.fields.length ? [further.element] : []), ...own);
+    root.replaceChildren(h("div", { class: "grid2" }, labelled(t("Positions"), where, { pointer: "/crs" }), labelled(t("Decision steps"), most, { pointer: "/max_steps" }), labelled(t("Kinds of material"), kinds, { pointer: "/materials" })), materialNaming(problem, fields), ...(further.fields.length ? [further.element] : []), ...own);
   };
   let known = null;
   const redraw = ({ problem, fields }) => {
