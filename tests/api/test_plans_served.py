@@ -178,3 +178,18 @@ def test_a_leg_has_the_altitude_that_is_asked_for(client, flown):
     assert (beyond.status_code, beyond.json()["errors"][0]["parameter"]) == (409, "altitude_of")
     wrong = take(client, answer, "briefing", altitude_by="stop")
     assert (wrong.status_code, wrong.json()["errors"][0]["parameter"]) == (422, "altitude_by")
+
+
+def test_without_a_format_a_plan_is_the_page_to_print(client, flown):
+    _, answer = flown
+    page = client.get(f"/jobs/{answer['job_id']}/plan", params={"begins": "2026-11-30T06:30"})
+    assert page.headers["content-type"].startswith("text/html")
+    assert "begins on 2026-11-30 at 06:30" in page.text
+
+
+@pytest.mark.parametrize("begins", ["0.5", "1764484200", "2026-11-30", "tomorrow"])
+def test_a_plan_begins_at_a_date_and_a_time(client, flown, begins):
+    _, answer = flown
+    refused = take(client, answer, "html", begins=begins)
+    assert refused.status_code == 422
+    assert "is not a date and time such as 2026-11-30T06:30" in refused.json()["detail"]

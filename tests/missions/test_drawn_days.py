@@ -131,7 +131,7 @@ def test_a_day_follows_from_its_seed(kind):
 
 def test_a_plan_over_futures_is_of_what_is_known_and_follows_from_the_seeds():
     greedy = create_solver("greedy", parse_parameters("greedy", {}), SolverContext())
-    drawn, arm = draw("reloads", 3), Arm(over_futures(greedy, 60.0, "reloads"), ticks=True)
+    drawn, arm = draw("all", 3), Arm(over_futures(greedy, 60.0, "all"), ticks=True)
     flown = fly_day(drawn, arm, 1)
     known = set(drawn.areas) | {base.id for base in drawn.problem.bases}
     assert {each.stop.id for each in flown.done} <= known

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
@@ -59,6 +59,16 @@ class PlanFormat(StrEnum):
     BRIEFING = "briefing"
     KML = "kml"
     GPX = "gpx"
+
+
+_MOMENT = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d")
+
+
+def _by_the_calendar(given: object) -> object:
+    """Refuse what begins without a date and a time: a bare number would be seconds since 1970."""
+    if isinstance(given, str) and not _MOMENT.match(given):
+        raise ValueError("is not a date and time such as 2026-11-30T06:30")
+    return given
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,6 +283,7 @@ async def get_plan(
     ] = None,
     begins: Annotated[
         datetime | None,
+        BeforeValidator(_by_the_calendar),
         Query(
             description="html: when it begins, by the clock where it is flown; default: times count from 0"
         ),

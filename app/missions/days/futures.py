@@ -1,6 +1,7 @@
 """Replanning over sampled futures: what may still turn out is drawn several times, and each time planned for.
 
-What is drawn are areas that appear and legs that take longer. Losses are not, nor are wrong reports.
+What is drawn are legs that take longer, and areas that appear. Losses are not, nor are wrong reports. Where
+legs take as long as planned, nothing is drawn: who waits for areas that may not come earns less (README.md).
 
 Each of the plans, and the one for what is known alone, is then tried in all of the futures: stops that
 cannot be made there are dropped, and what is left is put in greedily. The plan with the best mean is taken.
@@ -53,9 +54,7 @@ def over_futures(solver: Solver, seconds: float, kind_name: str) -> Any:
 
     def decide(state: MissionState, _number: int, rng: np.random.Generator) -> Routes | None:
         known = without_plan(state.problem)
-        futures = [
-            future for future in (_future(state, kind, rng) for _ in range(FUTURES)) if future != known
-        ]
+        futures = [_future(state, kind, rng) for _ in range(FUTURES if kind.slowest > 1.0 else 0)]
         share = seconds * (_SHARE_OF_SEARCHES if futures else 1.0) / (1 + len(futures))
         plans = [_search(solver, each, state.routes, share, rng) for each in [known, *futures]]
         if not futures:
@@ -68,7 +67,7 @@ def over_futures(solver: Solver, seconds: float, kind_name: str) -> Any:
 
 
 def _future(state: MissionState, kind: Kind, rng: np.random.Generator) -> Problem:
-    """Draw what may turn out to remain; the problem itself where nothing can turn out otherwise."""
+    """Draw what may turn out to remain."""
     return without_plan(
         state.problem,
         uavs=_uavs(state, kind, rng),
@@ -85,11 +84,9 @@ def _appearing(clock: float, kind: Kind, rng: np.random.Generator) -> list[Targe
 
 
 def _uavs(state: MissionState, kind: Kind, rng: np.random.Generator) -> tuple[UAV, ...]:
-    uavs = list(state.problem.uavs)
-    if kind.slowest > 1.0:
-        slower = rng.uniform(1.0, kind.slowest, (len(uavs), _LEGS)).mean(axis=1)
-        uavs = [replace(uav, speed=uav.speed / by) for uav, by in zip(uavs, slower.tolist(), strict=True)]
-    return tuple(uavs)
+    uavs = state.problem.uavs
+    slower = rng.uniform(1.0, kind.slowest, (len(uavs), _LEGS)).mean(axis=1)
+    return tuple(replace(uav, speed=uav.speed / by) for uav, by in zip(uavs, slower.tolist(), strict=True))
 
 
 def _search(
