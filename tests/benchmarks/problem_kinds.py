@@ -64,7 +64,10 @@ def six_materials(_number: int, rng: Random) -> Problem:
 
 def all_alike(number: int, rng: Random) -> Problem:
     """UAVs that differ in nothing."""
-    problem = of_a_family(number, rng)
+    return _alike(of_a_family(number, rng))
+
+
+def _alike(problem: Problem) -> Problem:
     first = problem.uavs[0]
     return replace(problem, uavs=tuple(replace(first, id=uav.id) for uav in problem.uavs))
 
@@ -72,12 +75,15 @@ def all_alike(number: int, rng: Random) -> Problem:
 def many_visits(_number: int, rng: Random) -> Problem:
     """Twenty visits a UAV, about: few UAVs with range and load for all of it."""
     m = int(rng.integers(1, 5))
-    problem = generate("clustered", m, 20 * m, 2, rng)
+    return _far_and_full(generate("clustered", m, 20 * m, 2, rng), 4.0, 25)
+
+
+def _far_and_full(problem: Problem, farther: float, max_steps: int) -> Problem:
     uavs = tuple(
-        replace(uav, voyage=4.0 * uav.voyage, loadlist=tuple(20.0 * amount for amount in uav.loadlist))
+        replace(uav, voyage=farther * uav.voyage, loadlist=tuple(20.0 * amount for amount in uav.loadlist))
         for uav in problem.uavs
     )
-    return replace(problem, uavs=uavs, max_steps=25)
+    return replace(problem, uavs=uavs, max_steps=max_steps)
 
 
 KINDS: dict[str, Kind] = {
@@ -170,9 +176,7 @@ def _one_way(number: int, rng: Random) -> Problem:
 
 def _identical(number: int, rng: Random) -> Problem:
     """15 UAVs that differ in nothing at one base, 30 areas."""
-    problem = generate("single_base", 15, 30, 3, rng)
-    first = problem.uavs[0]
-    return replace(problem, uavs=tuple(replace(first, id=uav.id) for uav in problem.uavs))
+    return _alike(generate("single_base", 15, 30, 3, rng))
 
 
 def _six_materials_25(number: int, rng: Random) -> Problem:
@@ -191,12 +195,7 @@ def _six_materials_25(number: int, rng: Random) -> Problem:
 
 def _long_routes(number: int, rng: Random) -> Problem:
     """6 x 80, twenty to thirty visits a UAV."""
-    problem = generate("clustered", 6, 80, 2, rng)
-    uavs = tuple(
-        replace(uav, voyage=5.0 * uav.voyage, loadlist=tuple(20.0 * amount for amount in uav.loadlist))
-        for uav in problem.uavs
-    )
-    return replace(problem, uavs=uavs, max_steps=30)
+    return _far_and_full(generate("clustered", 6, 80, 2, rng), 5.0, 30)
 
 
 HARD_KINDS: dict[str, Kind] = {

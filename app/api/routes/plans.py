@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
-from enum import StrEnum
 from typing import Annotated
 
 from fastapi import APIRouter, Query
@@ -26,18 +25,14 @@ from app.api.plan_formats.altitudes import (
     Separation,
 )
 from app.api.plan_formats.archive import zip_archive
-from app.api.plan_formats.briefing import briefing
-from app.api.plan_formats.csv_table import csv_table
 from app.api.plan_formats.errors import NoPlan, NotGeographic, NothingToFly, UnknownUAV
 from app.api.plan_formats.flown_plan import FlownPlan, flown_plan
+from app.api.plan_formats.formats import FORMATS, Document, FlightsDocument, PlanFormat
 from app.api.plan_formats.geojson import MEDIA_TYPE as GEOJSON
-from app.api.plan_formats.geojson import geojson
 from app.api.plan_formats.launches import MAX_INTERVAL_S, PlannedFlight, planned_flights
-from app.api.plan_formats.load_sheet import load_sheet
-from app.api.plan_formats.map_files import GPX_TYPE, KML_TYPE, gpx, kml
+from app.api.plan_formats.map_files import GPX_TYPE, KML_TYPE
 from app.api.plan_formats.mission import AltitudeReference, Delivery, Ending, FlightChoices
-from app.api.plan_formats.printed_page import printed_page
-from app.api.plan_formats.qgroundcontrol import file_name, plan_file, waypoint_file
+from app.api.plan_formats.qgroundcontrol import file_name
 from app.api.problem_details import responses
 from app.api.routes.parameters import JobId
 from app.api.services import Served
@@ -47,20 +42,11 @@ from app.jobs.model import Job
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 
-class PlanFormat(StrEnum):
-    """What a plan can be taken away as."""
-
-    GEOJSON = "geojson"
-    QGC_PLAN = "qgc-plan"
-    QGC_WPL = "qgc-wpl"
-    CSV = "csv"
-    LOAD_SHEET = "load-sheet"
-    HTML = "html"
-    BRIEFING = "briefing"
-    KML = "kml"
-    GPX = "gpx"
-
-
+_CHOICES, _APART = FlightChoices(), Separation()
+_OWN_ALTITUDE = re.compile(r"^(?P<whose>.+)=(?P<metres>\d+(\.\d+)?)(@(?P<reference>home|terrain))?$")
+_ZIP = "application/zip"
+_TEXT = {"schema": {"type": "string"}}
+_OBJECT = {"schema": {"type": "object"}}
 _MOMENT = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d")
 
 
@@ -69,65 +55,6 @@ def _by_the_calendar(given: object) -> object:
     if isinstance(given, str) and not _MOMENT.match(given):
         raise ValueError("is not a date and time such as 2026-11-30T06:30")
     return given
-
-
-@dataclass(frozen=True, slots=True)
-class _Document:
-    """A format of the whole plan."""
-
-    write: Callable[[FlownPlan], str]
-    media_type: str
-    ending: str
-
-
-@dataclass(frozen=True, slots=True)
-class _FlightsDocument:
-    """A format of all flights, as they are to be flown."""
-
-    write: Callable[[FlownPlan, Sequence[PlannedFlight]], str]
-    media_type: str
-    ending: str
-
-
-@dataclass(frozen=True, slots=True)
-class _FlightFile:
-    """A format of one flight."""
-
-    write: Callable[[PlannedFlight], str]
-    media_type: str
-    ending: str
-
-
-def _for_spreadsheets(write: Callable[[FlownPlan], str]) -> _Document:
-    """Write CSV with a byte order mark where a spreadsheet would take it for another encoding."""
-
-    def marked(plan: FlownPlan) -> str:
-        table = write(plan)
-        return table if table.isascii() else "\ufeff" + table
-
-    return _Document(marked, "text/csv; charset=utf-8", "csv")
-
-
-_FORMATS: dict[PlanFormat, _Document | _FlightsDocument | _FlightFile] = {
-    PlanFormat.GEOJSON: _Document(geojson, GEOJSON, "geojson"),
-    PlanFormat.CSV: _for_spreadsheets(csv_table),
-    PlanFormat.LOAD_SHEET: _for_spreadsheets(load_sheet),
-    PlanFormat.HTML: _Document(printed_page, "text/html; charset=utf-8", "html"),
-    PlanFormat.BRIEFING: _FlightsDocument(briefing, "text/plain; charset=utf-8", "txt"),
-    PlanFormat.KML: _FlightsDocument(kml, KML_TYPE, "kml"),
-    PlanFormat.GPX: _FlightsDocument(gpx, GPX_TYPE, "gpx"),
-    PlanFormat.QGC_PLAN: _FlightFile(
-        lambda each: plan_file(each.flight, each.choices, each.warnings), "application/json", "plan"
-    ),
-    PlanFormat.QGC_WPL: _FlightFile(
-        lambda each: waypoint_file(each.flight, each.choices), "text/plain; charset=utf-8", "waypoints"
-    ),
-}
-_CHOICES, _APART = FlightChoices(), Separation()
-_OWN_ALTITUDE = re.compile(r"^(?P<whose>.+)=(?P<metres>\d+(\.\d+)?)(@(?P<reference>home|terrain))?$")
-_ZIP = "application/zip"
-_TEXT = {"schema": {"type": "string"}}
-_OBJECT = {"schema": {"type": "object"}}
 
 
 @router.get(
@@ -336,8 +263,8 @@ def _file(
     plan = flown_plan(problem_from_record(job.payload["problem"]), answer)
     if format is PlanFormat.HTML:
         plan = replace(plan, title=title, begins=begins)
-    kind = _FORMATS[format]
-    if isinstance(kind, _Document):
+    kind = FORMATS[format]
+    if isinstance(kind, Document):
         # A page is looked at in the browser, everything else is kept.
         how = "inline" if format is PlanFormat.HTML else "attachment"
         sheet = "-loads" if format is PlanFormat.LOAD_SHEET else ""
@@ -345,7 +272,7 @@ def _file(
     if plan.problem.crs != "wgs84":
         raise NotGeographic(format.value, plan.problem.crs)
     flights = _flights(plan, uav, choices, _with_own(separation, altitude_of, plan))
-    if isinstance(kind, _FlightsDocument):
+    if isinstance(kind, FlightsDocument):
         whose = "" if uav is None else f"-{flights[0].flight.route + 1:03d}"
         name = f"plan-{job.id[:8]}{whose}.{kind.ending}"
         return _response(kind.write(plan, flights), kind.media_type, name)

@@ -1,7 +1,7 @@
 """Replanning over sampled futures: what may still turn out is drawn several times, and each time planned for.
 
 What is drawn are legs that take longer, and areas that appear. Losses are not, nor are wrong reports. Where
-legs take as long as planned, nothing is drawn: who waits for areas that may not come earns less (README.md).
+legs take as long as planned, nothing is drawn: waiting for areas that may not come costs more (README.md).
 
 Each of the plans, and the one for what is known alone, is then tried in all of the futures: stops that
 cannot be made there are dropped, and what is left is put in greedily. The plan with the best mean is taken.

@@ -237,7 +237,8 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], N
     stops, expected = int(search.routes.length.sum()), float(span.moves)
     if span.end < np.inf:
         expected = min(expected, a_second * (span.end - span.begin))
-    piece = at_once if crew.threads == 1 else moves_at_once(expected, a_second)
+    alone = crew.threads == 1
+    piece = at_once if alone else moves_at_once(expected, a_second)
     step = piece / span.moves
     large, cost = large_moves(search.routes.length)
     while done < span.moves and share < 1.0 and not crew.stop():
@@ -251,6 +252,7 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], N
         done += count
         now = span.share(done)
         expected = done / max(now, 1e-9)
+        piece = at_once if alone else moves_at_once(expected, a_second)
         # The next piece is expected to bring it as far as this one did.
         share, step = now, max(now - share, count / span.moves)
         if share - told >= 1.0 / _TOLD:

@@ -198,7 +198,7 @@ def moves_at_once(expected: float, a_second: float) -> int:
 
 
 def share_out(search: Search, rng: np.random.Generator, parts: int) -> list[Neighbourhood]:
-    """Divide UAVs and targets so that what lies together, and who meets there, is in one part.
+    """Divide UAVs and targets so that what lies together, and UAVs that meet there, are in one part.
 
     Returns
     -------
@@ -250,7 +250,7 @@ def _grow(
     routes: Routes, near: Neighbourhood, found: Parts, part: int, seed: int, size: float,
     queue: Integers, queued: Flags,
 ) -> None:  # fmt: skip
-    """Take targets into a part, with those who visit them and what else they visit, until it is large enough.
+    """Take targets into a part, with the UAVs that visit them and all that these visit, until it is full.
 
     Its size counts targets and stops.
     """
