@@ -26,9 +26,11 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
-from numba.core import caching, sigutils, types
+from numba.core import caching, sigutils
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
+
+import app.simulation.callees  # noqa: F401
 
 __all__ = ["compile_in_turns", "compiled_here", "first_at", "njit", "source_stamp", "stamped_files"]
 
@@ -146,20 +148,6 @@ _OWN = (ProvidedFolder, BesideSource, UserFolder)
 config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined]  # numba sets its options at run time
     [*(f"{__name__}.{locator.__name__}" for locator in _OWN), "IPythonCacheLocator", "ZipCacheLocator"]
 )
-
-
-def _type_of_any_value(self: Any, args: Any, kws: Any) -> Any:
-    """Type a call of a compiled function in another one by the types of its arguments, not by their values.
-
-    Numba would compile a function once more for each number or truth value that stands in a call of it.
-    """
-    kws = {name: _of_any_value(given) for name, given in kws.items()}
-    return _type_of_call(self, tuple(map(_of_any_value, args)), kws)
-
-
-_of_any_value: Any = types.unliteral
-_type_of_call = Dispatcher.get_call_template
-Dispatcher.get_call_template = _type_of_any_value  # type: ignore[method-assign]  # numba has no hook for it
 
 
 def compile_in_turns() -> None:

@@ -316,7 +316,7 @@ def create_solver(
     own = line.comparison or _mode_of(parameters) == _PAPER
     learns = line.learns and keeps_checkpoint
     floored = _resolve(_FLOOR)(solver, parameters, greedy=not own, learns=learns)
-    return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored))
+    return cast(Solver, _resolve(_PLANNED_UNLOADING)(floored, context))
 
 
 def _mode_of(parameters: Parameters) -> str | None:

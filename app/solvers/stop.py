@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from app.solvers.protocol import StopCriterion
+from app.solvers.protocol import SolverContext, StopCriterion
 
 
 class Never:
@@ -122,6 +122,16 @@ class WhileSpare:
     def seconds_left(self) -> float:
         """Return what the other criterion leaves."""
         return self._other.seconds_left()
+
+
+def a_thread_each(stop: StopCriterion, context: SolverContext) -> list[StopCriterion]:
+    """Return what ends the search of each thread, first the one that ends all.
+
+    Under a time limit there are more threads where cores are idle; they end when those are needed.
+    """
+    spare = 0 if math.isinf(stop.seconds_left()) else context.spare_threads()
+    of_spare = (WhileSpare(stop, context.spare_threads, place) for place in range(1, spare + 1))
+    return [stop] * context.threads + list(of_spare)
 
 
 class Event(Protocol):

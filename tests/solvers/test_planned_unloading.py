@@ -40,8 +40,8 @@ def planned(problem):
     return replace(problem, objective=replace(problem.objective, unloading="planned"))
 
 
-def solve(problem, name="local_search", stop=never, report=lambda progress: None):
-    solver = create_solver(name, parse_parameters(name, QUICK[name]), SolverContext())
+def solve(problem, name="local_search", stop=never, report=lambda progress: None, threads=1):
+    solver = create_solver(name, parse_parameters(name, QUICK[name]), SolverContext(threads=threads))
     return solver.solve(problem, 3, stop, report)
 
 
@@ -154,6 +154,17 @@ class Clock:
     def __call__(self):
         self.now += 0.001
         return self.now
+
+
+def test_threads_search_on_together_from_the_best_plan_and_find_the_same_each_time():
+    """The greedy rule's plan is the same for one and for two, so what differs is found by the threads."""
+    gains = []
+    for seed in range(5):
+        problem = planned(generate("uniform", 8, 20, 3, np.random.default_rng(seed)))
+        one, two, again = (solve(problem, "greedy", threads=number).plan for number in (1, 2, 2))
+        assert two == again
+        gains.append(judged(problem, two) - judged(problem, one))
+    assert sum(gains) > 0
 
 
 def test_a_time_limit_leaves_a_share_to_the_planning_of_the_unloading():

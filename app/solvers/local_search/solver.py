@@ -16,7 +16,7 @@ from app.solvers.parameters import LocalSearchParameters
 from app.solvers.protocol import History, Progress, Report, Solution, SolverContext, StopCriterion
 from app.solvers.seeds import seed_sequence
 from app.solvers.start import begin_search
-from app.solvers.stop import WhileSpare
+from app.solvers.stop import a_thread_each
 
 
 class LocalSearch:
@@ -60,12 +60,9 @@ def search_on(
 ) -> None:
     """Search from a current plan on some threads, each with the moves and a stream of random numbers.
 
-    The same seed and number of threads give the same plan as long as `stop` does not end it early. Under a
-    time limit there are more threads where cores are idle; they end when those are needed.
+    The same seed and number of threads give the same plan as long as `stop` does not end it early.
     """
-    spare = 0 if math.isinf(stop.seconds_left()) else context.spare_threads()
-    stops = [stop] * context.threads
-    stops += [WhileSpare(stop, context.spare_threads, place) for place in range(1, spare + 1)]
+    stops = a_thread_each(stop, context)
     streams = seed_sequence(seed).spawn(len(stops))
     searches = [search, *(replica(search) for _ in stops[1:])]
     generators = [np.random.default_rng(stream) for stream in streams]

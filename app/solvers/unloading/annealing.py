@@ -63,13 +63,21 @@ def new_planned_search(arrays: ProblemArrays, actions: Actions) -> PlannedSearch
     actions
         (S', M) joint actions of a plan that is legal but for visits that unload nothing.
     """
-    search, unloading = new_search(arrays), new_unloading(arrays)
-    set_routes(search, actions)
     m, n, _ = arrays.shape
     planned = PlannedSearch(
-        search, unloading, np.tile(np.arange(m), int(arrays.max_steps[0])), bool(any_limited(arrays)),
-        np.zeros(n), np.zeros(3),
+        new_search(arrays), new_unloading(arrays), np.tile(np.arange(m), int(arrays.max_steps[0])),
+        bool(any_limited(arrays)), np.zeros(n), np.zeros(3),
     )  # fmt: skip
+    begin_from(planned, actions)
+    return planned
+
+
+def begin_from(planned: PlannedSearch, actions: Actions) -> None:
+    """Let a search go on from another plan, which is its incumbent then; see :func:`new_planned_search`."""
+    search, unloading = planned.search, planned.unloading
+    arrays = search.arrays
+    m, n, _ = arrays.shape
+    set_routes(search, actions)
     visits = visits_of_routes(search.routes, planned.flight)
     for i in range(m if arrays.n_bases else 0):
         note_flights(visits, i, n)
@@ -77,7 +85,6 @@ def new_planned_search(arrays: ProblemArrays, actions: Actions) -> PlannedSearch
     planned.tally[SATISFACTION] = serve_at_best(arrays, visits, unloading, n)
     search.best[0] = -np.inf
     keep_if_best(planned)
-    return planned
 
 
 @compiled

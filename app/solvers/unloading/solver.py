@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +21,27 @@ from app.solvers.floor import nothing_to_fly
 from app.solvers.local_search.annealing import actions_of
 from app.solvers.local_search.effort import large_moves
 from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
-from app.solvers.protocol import History, Progress, Proof, Report, Solution, Solver, StopCriterion
+from app.solvers.protocol import (
+    History,
+    Progress,
+    Proof,
+    Report,
+    Solution,
+    Solver,
+    SolverContext,
+    StopCriterion,
+)
 from app.solvers.seeds import seed_sequence
-from app.solvers.stop import share_of_time
+from app.solvers.stop import a_thread_each, share_of_time
 from app.solvers.unloading.all_routes import AllRoutes
-from app.solvers.unloading.annealing import MOVES, WORK, PlannedSearch, anneal_planned, new_planned_search
+from app.solvers.unloading.annealing import (
+    MOVES,
+    WORK,
+    PlannedSearch,
+    anneal_planned,
+    begin_from,
+    new_planned_search,
+)
 
 _ALGORITHM_SHARE = 0.6
 """Share of the work, and of a time limit, that the algorithm itself has."""
@@ -37,10 +56,10 @@ _MOVES_A_VISIT = 8_000
 """Moves for each visit there can be."""
 
 _MOST_WORK = 60e6
-"""Visits that a search looks at, at most: about a second."""
+"""Visits that a search looks at, at most: about a second. Of one thread."""
 
 _LONGEST = 25
-"""Times as many of both, at most, for which a search with reloads goes on under a time limit."""
+"""Times as many of both, at most, for which it goes on under a time limit."""
 
 _MOST_AT_A_GLANCE = 1_000
 """Amounts of a plan up to which a linear program for them takes some milliseconds."""
@@ -69,10 +88,13 @@ class PlannedUnloading:
     ----------
     algorithm
         The other one.
+    context
+        Says how many threads may search.
     """
 
-    def __init__(self, algorithm: Solver) -> None:
+    def __init__(self, algorithm: Solver, context: SolverContext) -> None:
         self.algorithm = algorithm
+        self._context = context
 
     def solve(self, problem: Problem, seed: int, stop: StopCriterion, report: Report) -> Solution:
         """See :class:`~app.solvers.protocol.Solver`.
@@ -99,9 +121,8 @@ class PlannedUnloading:
         solution = self.algorithm.solve(greedy, seed, share_of_time(stop, share), told)
         incumbent.consider(solution.plan)
         history = History(list(solution.history.epoch), list(solution.history.reward))
-        rng = np.random.default_rng(seed_sequence(seed, 0, 1))
         until = share_of_time(stop, 0.5) if tiny else stop
-        _improve(incumbent, rng, until, report, history, share)
+        _improve(incumbent, seed, a_thread_each(until, self._context), report, history, share)
         proof = None
         if tiny and not stop():
             plans = AllRoutes(incumbent.arrays, incumbent.plan.as_array(), incumbent.reward)
@@ -197,66 +218,119 @@ def _reward(arrays: ProblemArrays, actions: Actions) -> float:
     return float(result.reward[0]) if result.rule[0] == ALLOWED else -np.inf
 
 
+class _Effort(NamedTuple):
+    """What a search takes: moves, work, and time, whichever is over first.
+
+    Attributes
+    ----------
+    moves, work
+        Of one thread; see :class:`~app.solvers.unloading.annealing.PlannedSearch`.
+    seconds
+        That are left at its begin.
+    """
+
+    moves: float
+    work: float
+    seconds: float
+
+    def done(self, planned: PlannedSearch, stop: StopCriterion) -> float:
+        """Return how much of it is over."""
+        limited = 0.0 < self.seconds < math.inf
+        by_time = 1.0 - stop.seconds_left() / self.seconds if limited else 0.0
+        return float(max(planned.tally[MOVES] / self.moves, planned.tally[WORK] / self.work, by_time))
+
+
+class _Searcher:
+    """One thread's search.
+
+    Parameters
+    ----------
+    planned, rng, stop
+        Its plan, its source of randomness, and what ends it.
+    effort
+        What it may take, in all rounds.
+    """
+
+    def __init__(
+        self, planned: PlannedSearch, rng: np.random.Generator, stop: StopCriterion, effort: _Effort
+    ) -> None:
+        self.planned, self._rng, self._stop, self._effort = planned, rng, stop, effort
+        arrays, search = planned.search.arrays, planned.search
+        self._visits = arrays.shape[0] * int(arrays.max_steps[0])
+        self._heat = 0.0
+        largest, common = gains(arrays, search.routes)
+        leg = neighbour_leg(arrays, search.near)
+        self._hottest, self._coldest = _HOT * largest, coldest_by_distance(arrays, leg, _COLD * common)
+
+    def go_through(self, number: int) -> None:
+        """Anneal from the highest temperature to the lowest, in pieces of about 2 ms."""
+        planned, length = self.planned, max(1, _MOVES_A_VISIT * self._visits // 200)
+        step = length * _ROUNDS / (_MOVES_A_VISIT * self._visits)
+        while not self._stop():
+            share = self._effort.done(planned, self._stop) * _ROUNDS - number
+            if share >= 1.0:
+                break
+            hot, cold = (self._temperature(at) for at in (max(share, 0.0), min(1.0, max(share, 0.0) + step)))
+            large, _ = large_moves(planned.search.routes.length)
+            anneal_planned(planned, self._rng, hot, cold, length, _PIECE_WORK, large)
+            moves = planned.tally[MOVES] / max(self._effort.done(planned, self._stop), 1e-9)
+            self._heat = min(1.0, moves / (_PATIENT_MOVES_A_VISIT * self._visits))
+
+    def _temperature(self, share: float) -> float:
+        """Return that of a share of a round; without heat it is always the lowest."""
+        return self._coldest * (self._hottest / self._coldest) ** (self._heat * (1.0 - share))
+
+
 def _improve(
     incumbent: _Incumbent,
-    rng: np.random.Generator,
-    stop: StopCriterion,
+    seed: int,
+    stops: Sequence[StopCriterion],
     report: Report,
     history: History,
     begin: float,
 ) -> None:
-    """Search on from the incumbent; without time, not even what the search needs is made ready."""
+    """Search on from the incumbent, a thread a stop criterion; after each round all go on from the best plan.
+
+    Without time, not even what the search needs is made ready.
+    """
+    stop = stops[0]
     if stop():
         return
-    arrays = incumbent.arrays
-    planned = new_planned_search(arrays, incumbent.plan.as_array())
-    near, epoch = planned.search.near, history.epoch[-1] if history.epoch else 0
-    possible = len(near.active) > 0 and len(near.wanted) > 0
-    visits = arrays.shape[0] * int(arrays.max_steps[0])
-    moves, limit, heat = _MOVES_A_VISIT * visits, stop.seconds_left(), 0.0
-    # With reloads this search finds most of what there is to find, and uses the time that it has.
-    most = _LONGEST if arrays.n_bases and limit < math.inf else 1
-    largest, common = gains(arrays, planned.search.routes)
-    leg = neighbour_leg(arrays, near) if possible else 0.0
-    temperatures = _HOT * largest, coldest_by_distance(arrays, leg, _COLD * common)
-    known = float(planned.search.best[0])
-    for number in range(1, _ROUNDS + 1):
-        while possible and not stop():
-            share = _share_done(planned, most * moves, most * _MOST_WORK, limit, stop) * _ROUNDS - (
-                number - 1
-            )
-            if share >= 1.0:
-                break
-            _piece(planned, rng, moves, heat, max(share, 0.0), temperatures)
-            done = _share_done(planned, most * moves, most * _MOST_WORK, limit, stop)
-            heat = min(1.0, planned.tally[MOVES] / max(done, 1e-9) / (_PATIENT_MOVES_A_VISIT * visits))
-        # To unload a large plan at best takes a while, also when time is up.
-        if planned.search.best[0] > known:
-            known = float(planned.search.best[0])
-            incumbent.consider_actions(actions_of(planned.search))
-        history.add(epoch + number, incumbent.reward)
-        fraction = begin + (1 - begin) * number / _ROUNDS
-        report(Progress(min(fraction, 1.0), epoch + number, incumbent.reward, incumbent.plan))
+    arrays, actions = incumbent.arrays, incumbent.plan.as_array()
+    first = new_planned_search(arrays, actions)
+    near, epoch = first.search.near, history.epoch[-1] if history.epoch else 0
+    limit = stop.seconds_left()
+    longest = _LONGEST if limit < math.inf else 1
+    moves = _MOVES_A_VISIT * arrays.shape[0] * int(arrays.max_steps[0])
+    effort = _Effort(longest * moves, longest * _MOST_WORK, limit)
+    own = seed_sequence(seed, 0, 1)
+    searchers = [_Searcher(first, np.random.default_rng(own), stop, effort)]
+    if not (len(near.active) and len(near.wanted)):
+        stops, searchers = stops[:1], []
+    for ends, stream in zip(stops[1:], own.spawn(len(stops) - 1), strict=True):
+        planned = new_planned_search(arrays, actions)
+        searchers.append(_Searcher(planned, np.random.default_rng(stream), ends, effort))
+    known = float(first.search.best[0])
+    with ThreadPoolExecutor(max(1, len(stops) - 1)) as threads:
+        for number in range(_ROUNDS):
+            others = [threads.submit(each.go_through, number) for each in searchers[1:]]
+            for each in searchers[:1]:
+                each.go_through(number)
+            for other in others:
+                other.result()
+            best = max((each.planned for each in searchers), key=_best_of, default=first)
+            # To unload a large plan at best takes a while, also when time is up.
+            if best.search.best[0] > known:
+                known = float(best.search.best[0])
+                actions = actions_of(best.search)
+                incumbent.consider_actions(actions)
+            if len(searchers) > 1 and not stop():
+                for each in searchers:
+                    begin_from(each.planned, actions)
+            history.add(epoch + number + 1, incumbent.reward)
+            fraction = begin + (1 - begin) * (number + 1) / _ROUNDS
+            report(Progress(min(fraction, 1.0), epoch + number + 1, incumbent.reward, incumbent.plan))
 
 
-def _share_done(planned: PlannedSearch, moves: int, work: float, limit: float, stop: StopCriterion) -> float:
-    """How much of the search is done: by moves, by work, or by the time limit, whichever is most."""
-    by_time = 1.0 - stop.seconds_left() / limit if 0.0 < limit < math.inf else 0.0
-    return float(max(planned.tally[MOVES] / moves, planned.tally[WORK] / work, by_time))
-
-
-def _piece(
-    planned: PlannedSearch,
-    rng: np.random.Generator,
-    moves: int,
-    heat: float,
-    share: float,
-    temperatures: tuple[float, float],
-) -> None:
-    """Anneal for about 2 ms at the temperatures after a share of a round; `heat` 0 keeps to the lowest."""
-    length = max(1, moves // 200)
-    after = min(1.0, share + length * _ROUNDS / moves)
-    hottest, coldest = temperatures
-    large, _ = large_moves(planned.search.routes.length)
-    hot, cold = (coldest * (hottest / coldest) ** (heat * (1 - at)) for at in (share, after))
-    anneal_planned(planned, rng, hot, cold, length, _PIECE_WORK, large)
+def _best_of(planned: PlannedSearch) -> float:
+    return float(planned.search.best[0])
