@@ -21,15 +21,16 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from app.jobs import worker
 from app.jobs.errors import describe
-from app.jobs.executor import Executor, Lost, Outcome, Raised, Work
+from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Work
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
-from app.jobs.worker import Ended, clean
+from app.jobs.worker import Reporter, perform
 from app.logs import configure_worker_logs
 
 REPORT_INTERVAL_S = 0.5
@@ -38,11 +39,8 @@ REPORT_INTERVAL_S = 0.5
 OWN_CLUSTER = "local"
 """An address for which a cluster is started on this machine, and ended with the executor."""
 
-_UNHEARD_S = 0.05
-"""Work that has ended by then is not asked for its progress; the last one comes with its end."""
-
 _TALK = "talk"
-_TALKERS = 4
+_TALKERS = 2
 
 _serials = itertools.count(1)
 
@@ -124,7 +122,7 @@ class RayExecutor(Executor):
             max_restarts=0,
             runtime_env={"env_vars": self._environment},
         )
-        return _Worker(self._ray, actor.remote(self._log_level), self._warm_up)
+        return _Worker(self._ray, actor.remote(self._log_level))
 
 
 @contextlib.contextmanager
@@ -144,15 +142,11 @@ def _kept_signals() -> Iterator[None]:
 class _Worker:
     """A worker actor as the executor sees it."""
 
-    def __init__(self, ray: ModuleType, actor: Any, warm_up: tuple[Any, ...]) -> None:
-        self._ray, self._actor, self._warm_up = ray, actor, warm_up
+    def __init__(self, ray: ModuleType, actor: Any) -> None:
+        self._ray, self._actor = ray, actor
         self.name: str = actor._actor_id.hex()[:12]
-        self.gone = False
+        self._gone = False
         self._serial = 0
-        self._newest: Progress | None = None
-
-    async def warm_up(self) -> None:
-        await self._actor.warm_up.remote(*self._warm_up)
 
     async def stay(self) -> None:
         """Wait until the process is gone."""
@@ -161,37 +155,27 @@ class _Worker:
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the actor was gone before."""
-        if self.gone:
+        if self._gone:
             return None
-        self._serial, self._newest = next(_serials), None
+        self._serial = next(_serials)
         left = None if math.isinf(work.deadline) else work.deadline - time.monotonic()
-        listening = asyncio.create_task(self._listen(self._serial, work.on_progress))
-        call = work.labels, work.function, work.payload
+        call = work.labels, work.function, work.payload, left, cancelled
         try:
-            ended: Ended = await self._actor.run.remote(self._serial, *call, left, cancelled)
+            async for sent in self._actor.run.options(num_returns="streaming").remote(self._serial, *call):
+                message: Message = await sent
+                if not isinstance(message, Progress):
+                    return message
+                work.on_progress(message)
         except Exception as error:
             errors = self._ray.exceptions
-            if isinstance(error, errors.RayError) and not isinstance(error, errors.RayTaskError):
-                self.gone = True
-                return Lost(f"worker {self.name} is gone: {type(error).__name__}")
-            # What was to be sent, or what came back, cannot be pickled; the worker is well.
-            return Raised(describe(error), traceback.format_exc())
-        finally:
-            listening.cancel()
-        if ended.progress is not None and ended.progress != self._newest:
-            work.on_progress(ended.progress)
-        return ended.outcome
-
-    async def _listen(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
-        """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
-        count = 0
-        await asyncio.sleep(_UNHEARD_S)
-        with contextlib.suppress(self._ray.exceptions.RayError):
-            call = self._actor.progress_after.options(concurrency_group=_TALK)
-            while (news := await call.remote(serial, count)) is not None:
-                count, self._newest = news
-                on_progress(news[1])
-                await asyncio.sleep(REPORT_INTERVAL_S)
+            if not isinstance(error, errors.RayError) or isinstance(error, errors.RayTaskError):
+                # What was to be sent, or what came back, cannot be pickled; the worker is well.
+                return Raised(describe(error), traceback.format_exc())
+            reason = type(error).__name__
+        else:
+            reason = "it has sent no outcome"
+        self._gone = True
+        return Lost(f"worker {self.name} is gone: {reason}")
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
@@ -205,14 +189,12 @@ class _Worker:
             self._ray.kill(self._actor)
 
     async def discard(self) -> None:
-        self.gone = True
+        self._gone = True
         self.kill()
 
 
 class RayWorker:
-    """A worker of the cluster.
-
-    The work runs in one thread, calls about it in others; what they share is guarded by a condition.
+    """A worker of the cluster: work is done in one thread, calls about it come in others.
 
     Parameters
     ----------
@@ -223,16 +205,11 @@ class RayWorker:
     def __init__(self, log_level: str | None) -> None:
         if log_level is not None:
             configure_worker_logs(log_level)
-        self._changed = threading.Condition()
-        self._serial = 0
-        self._context = WorkContext.in_process(lambda _progress: None)
-        self._latest: Progress | None = None
-        self._count = 0
-        self._cancelled = 0
-
-    def warm_up(self, *arguments: Any) -> None:
-        """Make the first piece of work as quick as the later ones."""
-        worker.warm_up(*arguments)
+        self._sent: SimpleQueue[Message] = SimpleQueue()
+        self._reporter = Reporter(self._send, REPORT_INTERVAL_S)
+        self._work = ThreadPoolExecutor(1)
+        self._lock = threading.Lock()
+        self._cancelled, self._serial, self._context = 0, 0, WorkContext(self._reporter.report)
 
     def stay(self) -> None:
         """Never return: a caller that waits for it learns that this process has died."""
@@ -246,13 +223,13 @@ class RayWorker:
         payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
-    ) -> Ended:
-        """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
+    ) -> Iterator[Message]:
+        """Do one piece of work, and yield its progress and then its outcome.
 
         Parameters
         ----------
         serial
-            Tells this work from others in calls about it; it grows.
+            Tells this work from others in calls about it.
         labels
             What the lines have that are logged meanwhile.
         work, payload
@@ -262,44 +239,24 @@ class RayWorker:
         cancelled
             Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
-
-        def report(progress: Progress) -> None:
-            with self._changed:
-                self._latest = progress
-                self._count += 1
-                self._changed.notify_all()
-
-        context = WorkContext.in_process(report, time_left_s)
-        with self._changed:
-            self._serial, self._context, self._latest, self._count = serial, context, None, 0
+        context = WorkContext.in_process(self._reporter.report, time_left_s)
+        with self._lock:
+            self._serial, self._context = serial, context
             if cancelled or self._cancelled == serial:
                 context.cancel()
-        outcome = worker.perform(labels, work, payload, context)
-        with self._changed:
-            last = self._latest
-            self._serial, self._latest = -serial, None
-            self._changed.notify_all()
-        return Ended(outcome, None if last is None else clean(last))
+        self._sent = SimpleQueue()  # what work reports after its end is not of the next
+        self._work.submit(perform, labels, work, payload, context, self._reporter)
+        message: Message | None = None
+        while message is None or isinstance(message, Progress):
+            message = self._sent.get()
+            yield message
 
-    def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
-        """Wait until the work has reported more than ``count`` times; None once it has ended.
-
-        It may be called before the work has come here.
-        """
-
-        def has_news() -> bool:
-            ended = self._serial == -serial or abs(self._serial) > serial
-            return ended or (self._serial == serial and self._count > count)
-
-        with self._changed:
-            self._changed.wait_for(has_news)
-            if self._serial != serial or self._latest is None:
-                return None
-            return self._count, clean(self._latest)
+    def _send(self, message: Message) -> None:
+        self._sent.put(message)
 
     def cancel(self, serial: int) -> None:
         """Ask the work to stop; also if it has been sent and not begun."""
-        with self._changed:
+        with self._lock:
             self._cancelled = serial
             if self._serial == serial:
                 self._context.cancel()
