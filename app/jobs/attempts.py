@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -35,8 +36,8 @@ class Attempt:
 
     Attributes
     ----------
-    job, deadline
-        As they were taken from the queue.
+    job
+        As it was taken from the queue.
     events
         Of the job.
     begun_at
@@ -56,13 +57,12 @@ class Attempt:
     """
 
     job: Job
-    deadline: float | None
     events: JobEvents
     progress: Progress
     begun_at: float
-    saved_at: float
-    unsaved: bool = False
     at_once: bool = False
+    saved_at: float = field(default_factory=time.monotonic)
+    unsaved: bool = False
     execution: Execution | None = None
     killed_for: Reason | None = None
     timers: list[asyncio.TimerHandle] = field(default_factory=list)
@@ -136,7 +136,7 @@ class Attempts:
         """Return of each that holds a worker its lane, how long it has run, and what its limit leaves it."""
         for each in self:
             if not each.at_once:
-                left_s = None if each.deadline is None else each.deadline - now
+                left_s = None if each.job.deadline is None else each.job.deadline - now
                 yield each.job.lane, now - each.begun_at, left_s
 
 

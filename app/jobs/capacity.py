@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from statistics import fmean
 
 from app.jobs.model import LANES, Lane
@@ -13,16 +12,8 @@ REMEMBERED_DURATIONS = 50
 _UNMEASURED_DURATION_S = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class QueueLimit:
-    """How many jobs of a lane may wait, and what to tell a caller for whom there is no place."""
-
-    places: int
-    retry_after_s: float
-
-
 class Capacity:
-    """Counts the workers in use, lane by lane, and remembers where it is worth to look for a job.
+    """Counts the workers in use, lane by lane.
 
     Trainings hold at most all workers but one, and so do the jobs of batches; where there is only one, they
     share it. Interactive jobs come first in both cases, then those of batches.
@@ -42,36 +33,13 @@ class Capacity:
         self._all = workers
         self._most: dict[Lane, int] = dict.fromkeys(LANES, max(1, workers - 1)) | {"interactive": workers}
         self.running: dict[Lane, int] = dict.fromkeys(LANES, 0)
-        self._looks = 0
-        # Only hints: the table says what waits, and one look too many finds nothing.
-        self._hints: set[Lane] = set()
         self._durations = {lane: deque[float](maxlen=REMEMBERED_DURATIONS) for lane in LANES}
 
-    def may_start(self, lane: Lane, ready: int) -> bool:
-        """Say whether a worker is free for a job of the lane, when ``ready`` workers are warm."""
-        # What is being looked for may be of any lane.
-        taken = sum(self.running.values()) + self._looks
-        return taken < ready and self.running[lane] + self._looks < self._most[lane]
-
-    def hint(self, lanes: Iterable[Lane]) -> None:
-        """Take note that a job may wait in some lanes."""
-        self._hints.update(lanes)
-
-    def begin_look(self, ready: int) -> tuple[Lane, ...]:
-        """Return the lanes to look for a job in, in their order, and keep a worker for it; none: do not look.
-
-        The hints to them are forgotten before the look: what is told of meanwhile is a reason to look again.
-        """
-        lanes = tuple(lane for lane in LANES if lane in self._hints and self.may_start(lane, ready))
-        self._looks += bool(lanes)
-        self._hints.difference_update(lanes)
-        return lanes
-
-    def end_look(self, found: Lane | None) -> None:
-        """Take note of the lane of the job that was found."""
-        self._looks -= 1
-        if found is not None:
-            self.running[found] += 1
+    def may_start(self, ready: int) -> tuple[Lane, ...]:
+        """Return the lanes of which a job may start, in their order, when ``ready`` workers are warm."""
+        if sum(self.running.values()) >= ready:
+            return ()
+        return tuple(lane for lane in LANES if self.running[lane] < self._most[lane])
 
     def ran(self, lane: Lane, durations_s: Iterable[float]) -> None:
         """Note how long jobs of the lane took."""

@@ -81,6 +81,7 @@ class _Worker:
         self.control = cast("MutableSequence[float]", context.RawArray(ctypes.c_double, new_control()))
         arguments = theirs, self.control, log_level, environment
         self._process = context.Process(target=worker.main, args=arguments)
+        self._forked = isinstance(context, ForkServerContext)
         self._loop = asyncio.get_running_loop()
         self._started: asyncio.Future[None] = self._loop.create_future()
         self._gone = asyncio.Event()
@@ -133,9 +134,9 @@ class _Worker:
             self._process.kill()
 
     async def discard(self) -> None:
-        """Kill the process and wait for its end; nobody waits for one that has to be made yet."""
+        """Kill the process and wait for its end; nobody waits for one that has to be forked yet."""
         self.kill()
-        if self._process.pid is not None:
+        if self._process.pid is not None or not self._forked:
             await self._gone.wait()
 
     def _live(self, theirs: Connection, environment: Mapping[str, str]) -> None:
@@ -145,17 +146,17 @@ class _Worker:
                 self._process.start()
         except Exception as error:  # whatever it is, it is raised where the start is waited for
             self._call(self._started.set_exception, error)
-            return
-        # Once only the worker has the other end, the pipe closes when the worker dies.
-        theirs.close()
-        if self._doomed:
-            self.kill()
-        self._call(self._started.set_result, None)
-        with contextlib.suppress(EOFError, OSError):
-            while True:
-                self._call(self._hear, self._pipe.recv())
-        self._process.kill()
-        self._process.join()
+        else:
+            # Once only the worker has the other end, the pipe closes when the worker dies.
+            theirs.close()
+            if self._doomed:
+                self.kill()
+            self._call(self._started.set_result, None)
+            with contextlib.suppress(EOFError, OSError):
+                while True:
+                    self._call(self._hear, self._pipe.recv())
+            self._process.kill()
+            self._process.join()
         atexit.unregister(self.kill)
         self._call(self._end)
 
