@@ -17,8 +17,7 @@ from typing import Any, TypeVar
 
 from structlog.contextvars import bind_contextvars
 
-from app.jobs.attempts import Attempt, Attempts, Writer, complete
-from app.jobs.capacity import REMEMBERED_DURATIONS, Capacity
+from app.jobs.attempts import REMEMBERED_DURATIONS, Attempt, Attempts, Writer, complete
 from app.jobs.clock import Loop
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.events import EventStreams
@@ -74,8 +73,8 @@ class Dispatcher:
         self._places, self._grace_s = places, overrun_grace_s
         self._executors = [executor] if reserve is None else [executor, reserve]
         self._executor, self._kinds = executor, store.kinds
-        self.attempts, self.events = Attempts(), EventStreams(store, self.runs)
-        self._capacity, self._writer = Capacity(executor.capacity), Writer()
+        self.attempts, self.events = Attempts(executor.capacity), EventStreams(store, self.runs)
+        self._writer = Writer()
         self._peers = Peers(store, lease_s)
         self._reserve = Reserve(store, self._writer, reserve, self._answer_at_once, self._has_spare)
         rest = self._peers, self, retention_s
@@ -95,7 +94,7 @@ class Dispatcher:
         await self._maintenance.recover()
         for lane in LANES:
             durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
-            self._capacity.ran(lane, durations)
+            self.attempts.ran(lane, durations)
         self._accepting = True
         await self._executor.start(self._loop.wake)
         await self._reserve.start()
@@ -151,9 +150,9 @@ class Dispatcher:
 
     async def _admit(self, lane: Lane, insert: Callable[..., tuple[Job, bool]]) -> tuple[Job, bool]:
         async with self._choosing:
-            reserved = lane in self._capacity.may_start(self._executor.ready)
-            self._capacity.running[lane] += reserved
-        free_s = self._capacity.time_to_a_place(lane, self.attempts.times(self._store.clock.now()))
+            reserved = lane in self.attempts.may_start(self._executor.ready)
+            self.attempts.reserved[lane] += reserved
+        free_s = self.attempts.time_to_a_place(lane, self.attempts.times(self._store.clock.now()))
         retry_after_s = free_s * random.uniform(1.0, _LATEST_RETURN)
         begins = False
         try:
@@ -162,8 +161,9 @@ class Dispatcher:
             )
             begins = created and job.status is JobStatus.RUNNING
         finally:
+            self.attempts.reserved[lane] -= reserved
             if reserved and not begins:
-                self._give_back(lane)
+                self._loop.wake()
         if created:
             _log.info("job taken in", extra={"job_id": job.id, "kind": job.kind, "lane": lane})
         if begins:
@@ -199,7 +199,7 @@ class Dispatcher:
         return Load(
             capacity=self._executor.capacity,
             ready=self._executor.ready,
-            running=dict(self._capacity.running),
+            running=self.attempts.by_lane(),
             restarts=sum(executor.restarts for executor in self._executors),
         )
 
@@ -254,11 +254,10 @@ class Dispatcher:
         """Give free workers to the jobs that wait."""
         while self._accepting:
             async with self._choosing:
-                lanes = self._capacity.may_start(self._executor.ready)
+                lanes = self.attempts.may_start(self._executor.ready)
                 job = await self._writer.write(self._store.claim, lanes) if lanes else None
                 if job is None:
                     return
-                self._capacity.running[job.lane] += 1
                 self._begin(job)
 
     async def _answer_at_once(self, job_ids: Sequence[str]) -> dict[str, float]:
@@ -315,24 +314,19 @@ class Dispatcher:
             if job is None:
                 _log.warning("a job went on without attempt %d", attempt.job.attempt)
             elif job.status is JobStatus.SUCCEEDED and not attempt.at_once:
-                self._capacity.ran(job.lane, [took])
+                self.attempts.ran(job.lane, [took])
             if job is not None and job.unfinished:
                 self._reserve.completing.wake()
         self.attempts.remove(attempt)
+        self._loop.wake()
         if job is not None:
             self.moved(job, took)
         if job is None or not job.status.finished:
             # It goes on later, or elsewhere: who listens has to look there.
             attempt.events.notify()
-        if not attempt.at_once:
-            self._give_back(attempt.job.lane)
 
     def _has_spare(self) -> bool:
-        return sum(self._capacity.running.values()) < self._executor.capacity
-
-    def _give_back(self, lane: Lane) -> None:
-        self._capacity.running[lane] -= 1
-        self._loop.wake()
+        return sum(self.attempts.by_lane().values()) < self._executor.capacity
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

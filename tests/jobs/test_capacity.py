@@ -6,26 +6,25 @@ from types import SimpleNamespace
 
 from harness import database_of, eventually, finished, running
 
-from app.jobs.attempts import Writer
-from app.jobs.capacity import Capacity
+from app.jobs.attempts import Attempts, Writer
 from app.jobs.model import LANES, JobKind, JobStatus
 from app.jobs.reserve import Reserve
 from app.jobs.store import JobStore
 
 
 def test_no_lane_but_the_first_takes_the_last_worker():
-    capacity = Capacity(2)
-    assert capacity.may_start(0) == ()
-    assert capacity.may_start(1) == LANES
-    capacity.running["training"] = 1
+    attempts = Attempts(2)
+    assert attempts.may_start(0) == ()
+    assert attempts.may_start(1) == LANES
+    attempts.reserved["training"] = 1
     # There is one training at a time, and one worker that is warm has it.
-    assert capacity.may_start(1) == ()
-    assert capacity.may_start(2) == ("interactive", "batch")
-    capacity.running["batch"] = 1
-    assert capacity.may_start(2) == ()
-    capacity.running["training"] = 0
-    assert capacity.may_start(2) == ("interactive", "training")
-    assert Capacity(1).may_start(1) == LANES
+    assert attempts.may_start(1) == ()
+    assert attempts.may_start(2) == ("interactive", "batch")
+    attempts.reserved["batch"] = 1
+    assert attempts.may_start(2) == ()
+    attempts.reserved["training"] = 0
+    assert attempts.may_start(2) == ("interactive", "training")
+    assert Attempts(1).may_start(1) == LANES
 
 
 def test_a_worker_is_kept_for_what_is_being_looked_for_and_what_is_told_of_meanwhile_is_found(tmp_path):
