@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -47,7 +46,7 @@ class Attempt:
     begun_at
         When it was handed to a worker, by the service's clock.
     progress
-        The newest; ``unsaved`` if it is not in the table yet, where the last went at ``saved_at``.
+        The newest; ``unsaved`` if it is not in the table yet.
     execution
         The work; None until it is handed over.
     at_once
@@ -65,7 +64,6 @@ class Attempt:
     progress: Progress
     begun_at: float
     at_once: bool = False
-    saved_at: float = field(default_factory=time.monotonic)
     unsaved: bool = False
     execution: Execution | None = None
     killed_for: Reason | None = None

@@ -82,6 +82,9 @@ class Dispatcher:
         self._loop = Loop(self._dispatch, "no job could be taken from the queue")
         # Who gets a free worker is decided for one job after the other.
         self._choosing = asyncio.Lock()
+        # How often it was told that a job may wait, and for how many of these none was left. Only hints: the
+        # table says what waits, and one look too many finds nothing.
+        self._told, self._looked = 1, 0
         self._loops: list[asyncio.Task[None]] = []
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
@@ -216,7 +219,7 @@ class Dispatcher:
         if not job.status.finished:
             self._reserve.watch(job)
             self._peers.tell("waiting", job.lane)
-            self.look()
+            self._look_for_one()
             return
         if (events := self.events.known(job.id)) is not None:
             events.end(job)
@@ -233,15 +236,19 @@ class Dispatcher:
         attempt.stop(self._grace_s)
 
     def look(self) -> None:
-        """Look at what waits in the table: something may have been told of it, or not."""
-        self._loop.wake()
+        """Look at all that waits in the table, of which nothing may have been told here."""
+        self._look_for_one()
         self._reserve.answering.wake()
+
+    def _look_for_one(self) -> None:
+        self._told += 1
+        self._loop.wake()
 
     def _hear(self, what: str, of: str) -> None:
         """React to what another service told."""
         match what:
             case "waiting":
-                self._loop.wake()
+                self._look_for_one()
             case "ended" if (events := self.events.known(of)) is not None:
                 events.notify()
             case "cancelled" if (attempt := self.attempts.of(of)) is not None:
@@ -252,11 +259,13 @@ class Dispatcher:
 
     async def _dispatch(self) -> None:
         """Give free workers to the jobs that wait."""
-        while self._accepting:
+        while self._accepting and self._looked < self._told:
             async with self._choosing:
-                lanes = self.attempts.may_start(self._executor.ready)
+                told, lanes = self._told, self.attempts.may_start(self._executor.ready)
                 job = await self._writer.write(self._store.claim, lanes) if lanes else None
                 if job is None:
+                    if lanes == LANES:
+                        self._looked = told
                     return
                 self._begin(job)
 

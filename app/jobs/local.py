@@ -22,6 +22,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, MutableSequence
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, SpawnContext
@@ -82,6 +83,8 @@ class _Worker:
         arguments = theirs, self.control, log_level, environment
         self._process = context.Process(target=worker.main, args=arguments)
         self._forked = isinstance(context, ForkServerContext)
+        # Not one of those that requests need: a large payload takes a while.
+        self._sender = ThreadPoolExecutor(1, "worker-send")
         self._loop = asyncio.get_running_loop()
         self._started: asyncio.Future[None] = self._loop.create_future()
         self._gone = asyncio.Event()
@@ -111,10 +114,11 @@ class _Worker:
             return None
         self._on_progress, self._outcome = work.on_progress, self._loop.create_future()
         self.control[CANCEL], self.control[DEADLINE] = float(cancelled), work.deadline
+        call = work.labels, work.function, work.payload
         try:
-            await asyncio.to_thread(self._pipe.send, (work.labels, work.function, work.payload))
+            await self._loop.run_in_executor(self._sender, self._pipe.send, call)
         except OSError:
-            return None
+            return Lost("it was ended before it began") if self._doomed else None
         except Exception as error:  # what was to be sent cannot be pickled
             return Raised(describe(error), traceback.format_exc())
         return await self._outcome
@@ -174,6 +178,7 @@ class _Worker:
 
     def _end(self) -> None:
         self._gone.set()
+        self._sender.shutdown(wait=False)
         if not self._outcome.done():
             self._outcome.set_result(Lost(f"worker process {self.name} died"))
 

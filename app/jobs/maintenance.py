@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from typing import TYPE_CHECKING
 
 from app.jobs.attempts import Attempt, Attempts, Writer
@@ -14,7 +13,6 @@ from app.jobs.store import JobStore
 if TYPE_CHECKING:
     from app.jobs.dispatcher import Dispatcher
 
-_TICK_S = 0.25
 _SAVE_INTERVAL_S = 1.0
 _LOOK_INTERVAL_S = 15.0
 _EXPIRE_INTERVAL_S, _EXPIRED_AT_ONCE = 600.0, 50
@@ -65,14 +63,13 @@ class Maintenance:
         self.loops = [Loop(chore, "the job table could not be kept in order", _AGAIN_S) for chore in chores]
 
     async def _save_progress(self) -> float:
-        now = time.monotonic()
-        due = [each for each in self._attempts if each.unsaved and now - each.saved_at >= _SAVE_INTERVAL_S]
-        for each in due:
-            each.unsaved, each.saved_at = False, now
-        if due:
-            items = [(each.job.id, each.job.attempt, each.progress) for each in due]
+        unsaved = [attempt for attempt in self._attempts if attempt.unsaved]
+        for attempt in unsaved:
+            attempt.unsaved = False
+        if unsaved:
+            items = [(each.job.id, each.job.attempt, each.progress) for each in unsaved]
             await self._writer.write(self._store.save_progress, items)
-        return _TICK_S
+        return _SAVE_INTERVAL_S
 
     async def recover(self) -> float:
         """Put back the jobs whose end could not be stored, and those of other processes that have died."""

@@ -130,6 +130,7 @@ class Reserve:
         """Take note of how much there is to do for a job that waits, should its time be up."""
         if job.kind in self._kinds and job.deadline is not None:
             self._efforts[job.id] = self._store.kinds[job.kind].effort(job.payload)
+            self.answering.wake()
 
     async def _answer_due(self) -> float | None:
         """Answer the jobs whose time has come; return how long there is nothing to do."""
