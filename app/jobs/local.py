@@ -79,8 +79,8 @@ class _Worker:
         environment: Mapping[str, str],
     ) -> None:
         self._pipe, theirs = context.Pipe()
-        self.control = cast("MutableSequence[float]", context.RawArray(ctypes.c_double, new_control()))
-        arguments = theirs, self.control, log_level, environment
+        self._control = cast("MutableSequence[float]", context.RawArray(ctypes.c_double, new_control()))
+        arguments = theirs, self._control, log_level, environment
         self._process = context.Process(target=worker.main, args=arguments)
         self._forked = isinstance(context, ForkServerContext)
         # Not one of those that requests need: a large payload takes a while.
@@ -113,7 +113,7 @@ class _Worker:
         if self._gone.is_set():
             return None
         self._on_progress, self._outcome = work.on_progress, self._loop.create_future()
-        self.control[CANCEL], self.control[DEADLINE] = float(cancelled), work.deadline
+        self._control[CANCEL], self._control[DEADLINE] = float(cancelled), work.deadline
         call = work.labels, work.function, work.payload
         try:
             await self._loop.run_in_executor(self._sender, self._pipe.send, call)
@@ -125,11 +125,11 @@ class _Worker:
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
-        self.control[CANCEL] = 1.0
+        self._control[CANCEL] = 1.0
 
     def share(self, workers: float) -> None:
         """Tell the work how many workers' cores it may use."""
-        self.control[SHARE] = workers
+        self._control[SHARE] = workers
 
     def kill(self) -> None:
         """Kill the process, now or as soon as it has been made."""
@@ -156,7 +156,9 @@ class _Worker:
             if self._doomed:
                 self.kill()
             self._call(self._started.set_result, None)
-            with contextlib.suppress(EOFError, OSError):
+            with contextlib.suppress(
+                Exception
+            ):  # one that sends what cannot be read is no better than a dead one
                 while True:
                     self._call(self._hear, self._pipe.recv())
             self._process.kill()
