@@ -21,16 +21,14 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from queue import SimpleQueue
 from types import MappingProxyType, ModuleType
 from typing import Any
 
+from app.jobs import worker
 from app.jobs.errors import describe
-from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Work
+from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Returned, Work
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
-from app.jobs.worker import Reporter, perform
 from app.logs import configure_worker_logs
 
 REPORT_INTERVAL_S = 0.5
@@ -39,8 +37,11 @@ REPORT_INTERVAL_S = 0.5
 OWN_CLUSTER = "local"
 """An address for which a cluster is started on this machine, and ended with the executor."""
 
+_UNHEARD_S = 0.05
+"""Work that has ended by then is not asked for its progress; the last one comes with its end."""
+
 _TALK = "talk"
-_TALKERS = 2
+_TALKERS = 4
 
 _serials = itertools.count(1)
 
@@ -147,6 +148,7 @@ class _Worker:
         self.name: str = actor._actor_id.hex()[:12]
         self._gone = False
         self._serial = 0
+        self._newest: Progress | None = None
 
     async def stay(self) -> None:
         """Wait until the process is gone."""
@@ -157,25 +159,36 @@ class _Worker:
         """Do one piece of work; None if the actor was gone before."""
         if self._gone:
             return None
-        self._serial = next(_serials)
+        self._serial, self._newest = next(_serials), None
         left = None if math.isinf(work.deadline) else work.deadline - time.monotonic()
+        listening = asyncio.create_task(self._listen(self._serial, work.on_progress))
         call = work.labels, work.function, work.payload, left, cancelled
         try:
-            async for sent in self._actor.run.options(num_returns="streaming").remote(self._serial, *call):
-                message: Message = await sent
-                if not isinstance(message, Progress):
-                    return message
-                work.on_progress(message)
+            progress, outcome = await self._actor.run.remote(self._serial, *call)
         except Exception as error:
             errors = self._ray.exceptions
-            if not isinstance(error, errors.RayError) or isinstance(error, errors.RayTaskError):
-                # What was to be sent, or what came back, cannot be pickled; the worker is well.
-                return Raised(describe(error), traceback.format_exc())
-            reason = type(error).__name__
-        else:
-            reason = "it has sent no outcome"
-        self._gone = True
-        return Lost(f"worker {self.name} is gone: {reason}")
+            if isinstance(error, errors.RayError) and not isinstance(error, errors.RayTaskError):
+                self._gone = True
+                return Lost(f"worker {self.name} is gone: {type(error).__name__}")
+            # What was to be sent, or what came back, cannot be pickled; the worker is well.
+            return Raised(describe(error), traceback.format_exc())
+        finally:
+            listening.cancel()
+        if progress is not None and progress != self._newest:
+            work.on_progress(progress)
+        ended: Outcome = outcome
+        return ended
+
+    async def _listen(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
+        """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
+        count = 0
+        await asyncio.sleep(_UNHEARD_S)
+        with contextlib.suppress(self._ray.exceptions.RayError):
+            call = self._actor.progress_after.options(concurrency_group=_TALK)
+            while (news := await call.remote(serial, count)) is not None:
+                count, self._newest = news
+                on_progress(news[1])
+                await asyncio.sleep(REPORT_INTERVAL_S)
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
@@ -194,7 +207,9 @@ class _Worker:
 
 
 class RayWorker:
-    """A worker of the cluster: work is done in one thread, calls about it come in others.
+    """A worker of the cluster.
+
+    The work is done in one thread, calls about it come in others; what they share is guarded by a condition.
 
     Parameters
     ----------
@@ -205,11 +220,12 @@ class RayWorker:
     def __init__(self, log_level: str | None) -> None:
         if log_level is not None:
             configure_worker_logs(log_level)
-        self._sent: SimpleQueue[Message] = SimpleQueue()
-        self._reporter = Reporter(self._send, REPORT_INTERVAL_S)
-        self._work = ThreadPoolExecutor(1)
-        self._lock = threading.Lock()
-        self._cancelled, self._serial, self._context = 0, 0, WorkContext(self._reporter.report)
+        self._changed = threading.Condition()
+        self._reporter = worker.Reporter(self._take, worker.REPORT_INTERVAL_S)
+        self._context = WorkContext(self._reporter.report)
+        self._serial = self._cancelled = self._count = 0
+        self._progress: Progress | None = None
+        self._outcome: Returned | Raised | None = None
 
     def stay(self) -> None:
         """Never return: a caller that waits for it learns that this process has died."""
@@ -223,13 +239,13 @@ class RayWorker:
         payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
-    ) -> Iterator[Message]:
-        """Do one piece of work, and yield its progress and then its outcome.
+    ) -> tuple[Progress | None, Returned | Raised | None]:
+        """Do one piece of work, and return its last progress and its outcome.
 
         Parameters
         ----------
         serial
-            Tells this work from others in calls about it.
+            Tells this work from others in calls about it; it grows.
         labels
             What the lines have that are logged meanwhile.
         work, payload
@@ -240,23 +256,44 @@ class RayWorker:
             Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
         context = WorkContext.in_process(self._reporter.report, time_left_s)
-        with self._lock:
-            self._serial, self._context = serial, context
+        with self._changed:
+            self._serial, self._context, self._progress, self._count = serial, context, None, 0
             if cancelled or self._cancelled == serial:
                 context.cancel()
-        self._sent = SimpleQueue()  # what work reports after its end is not of the next
-        self._work.submit(perform, labels, work, payload, context, self._reporter)
-        message: Message | None = None
-        while message is None or isinstance(message, Progress):
-            message = self._sent.get()
-            yield message
+        worker.perform(labels, work, payload, context, self._reporter)
+        with self._changed:
+            self._serial = -serial
+            self._changed.notify_all()
+            return self._progress, self._outcome
 
-    def _send(self, message: Message) -> None:
-        self._sent.put(message)
+    def _take(self, message: Message) -> None:
+        """Take note of what the work sends."""
+        with self._changed:
+            if isinstance(message, Progress):
+                self._progress, self._count = message, self._count + 1
+                self._changed.notify_all()
+            else:
+                self._outcome = message
+
+    def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
+        """Wait until the work has reported more than ``count`` times; None once it has ended.
+
+        It may be called before the work has come here.
+        """
+
+        def has_news() -> bool:
+            ended = self._serial == -serial or abs(self._serial) > serial
+            return ended or (self._serial == serial and self._count > count)
+
+        with self._changed:
+            self._changed.wait_for(has_news)
+            if self._serial != serial or self._progress is None:
+                return None
+            return self._count, self._progress
 
     def cancel(self, serial: int) -> None:
         """Ask the work to stop; also if it has been sent and not begun."""
-        with self._lock:
+        with self._changed:
             self._cancelled = serial
             if self._serial == serial:
                 self._context.cancel()

@@ -324,8 +324,7 @@ class JobStore(JobQueries):
         fields
             The fields.
         failed
-            The try was in vain: only after the last one, of which there are as many as a job may be lost,
-            does the result get the fields, which are those of one that is given up.
+            The try was in vain. The result gets the fields after the last one, as often as a job may be lost.
 
         Returns
         -------
