@@ -24,7 +24,6 @@ from app.api.server import Server
 from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
 from app.cli.progress import bar
 from app.jobs import model
-from app.jobs.owner import new_owner
 from app.jobs.store import JobStore
 from app.jobs.work_context import WorkContext
 from app.library.seeding import seed_library
@@ -79,7 +78,7 @@ def _prepare(settings: Settings) -> None:
         try:
             # A newer version must not change what another service works on.
             database.occupy()
-            for store in (PolicyLibrary(database), KeyStore(database), JobStore(database, new_owner(), 1)):
+            for store in (PolicyLibrary(database), KeyStore(database), JobStore(database, "migration", 1)):
                 store.migrate()
         finally:
             database.vacate()

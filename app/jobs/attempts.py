@@ -1,12 +1,14 @@
-"""Attempts at jobs: those that run here, and what becomes of their job in the table when they have ended."""
+"""Attempts at jobs: which run here, of which lanes more may, and what becomes of a job when one has ended."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from statistics import fmean
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from sqlalchemy.exc import InterfaceError, OperationalError
@@ -14,9 +16,11 @@ from sqlalchemy.exc import InterfaceError, OperationalError
 from app.jobs.errors import INTERNAL_ERROR, describe, failure
 from app.jobs.events import JobEvents
 from app.jobs.executor import Execution, Outcome, Raised, Returned
-from app.jobs.model import BEST_KNOWN, Job, JobStatus, JobSummary, Lane, Progress
+from app.jobs.model import BEST_KNOWN, LANES, Job, JobStatus, JobSummary, Lane, Progress
 from app.jobs.store import JobStore
 
+REMEMBERED_DURATIONS = 50
+_UNMEASURED_DURATION_S = 1.0
 _TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
 
 _log = logging.getLogger(__name__)
@@ -35,14 +39,14 @@ class Attempt:
 
     Attributes
     ----------
-    job, deadline
-        As they were taken from the queue.
+    job
+        As it was taken from the queue.
     events
         Of the job.
     begun_at
         When it was handed to a worker, by the service's clock.
     progress
-        The newest; ``unsaved`` if it is not in the table yet, where the last went at ``saved_at``.
+        The newest; ``unsaved`` if it is not in the table yet.
     execution
         The work; None until it is handed over.
     at_once
@@ -56,13 +60,11 @@ class Attempt:
     """
 
     job: Job
-    deadline: float | None
     events: JobEvents
     progress: Progress
     begun_at: float
-    saved_at: float
-    unsaved: bool = False
     at_once: bool = False
+    unsaved: bool = False
     execution: Execution | None = None
     killed_for: Reason | None = None
     timers: list[asyncio.TimerHandle] = field(default_factory=list)
@@ -96,20 +98,49 @@ class Attempt:
 
 
 class Attempts:
-    """The attempts that run here, each until its end is stored.
+    """The attempts that run here, each until its end is stored, and the workers that are left for others.
 
-    A job may have two: where this service was taken for dead by another and has then taken the job again, the
-    earlier attempt counts no more, and ends while the later one works.
+    Trainings hold at most all workers but one, and so do the jobs of batches; where there is only one, they
+    share it. Interactive jobs come first in both cases, then those of batches.
+
+    A job may have two attempts: where this service was taken for dead by another and has then taken the job
+    again, the earlier one counts no more, and ends while the later one works.
+
+    Parameters
+    ----------
+    workers
+        How many there are.
+
+    Attributes
+    ----------
+    reserved
+        Workers that are kept for jobs which are being taken in, by lane.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, workers: int) -> None:
+        self._all = workers
+        self._most: dict[Lane, int] = dict.fromkeys(LANES, max(1, workers - 1)) | {"interactive": workers}
         self._running: dict[tuple[str, int], Attempt] = {}
+        self._durations = {lane: deque[float](maxlen=REMEMBERED_DURATIONS) for lane in LANES}
+        self.reserved: Counter[Lane] = Counter()
 
     def __iter__(self) -> Iterator[Attempt]:
         return iter(list(self._running.values()))
 
     def __len__(self) -> int:
         return len(self._running)
+
+    def by_lane(self) -> dict[Lane, int]:
+        """Return how many workers each lane holds."""
+        held = Counter(attempt.job.lane for attempt in self if not attempt.at_once)
+        return {lane: held[lane] + self.reserved[lane] for lane in LANES}
+
+    def may_start(self, ready: int) -> tuple[Lane, ...]:
+        """Return the lanes of which a job may start, in their order, when ``ready`` workers are warm."""
+        held = self.by_lane()
+        if sum(held.values()) >= ready:
+            return ()
+        return tuple(lane for lane in LANES if held[lane] < self._most[lane])
 
     def add(self, attempt: Attempt) -> None:
         """Take note of an attempt, and end an earlier one at the same job."""
@@ -136,8 +167,49 @@ class Attempts:
         """Return of each that holds a worker its lane, how long it has run, and what its limit leaves it."""
         for each in self:
             if not each.at_once:
-                left_s = None if each.deadline is None else each.deadline - now
+                left_s = None if each.job.deadline is None else each.job.deadline - now
                 yield each.job.lane, now - each.begun_at, left_s
+
+    def ran(self, lane: Lane, durations_s: Iterable[float]) -> None:
+        """Note how long jobs of the lane took."""
+        self._durations[lane].extend(durations_s)
+
+    def time_to_a_place(self, lane: Lane, running: Iterable[tuple[Lane, float, float | None]]) -> float:
+        """Return the seconds until one job of a lane in which others wait will have been started, at least 1.
+
+        Parameters
+        ----------
+        lane
+            The lane.
+        running
+            Of the jobs that run, their lane, for how long they have, and how long their time limit leaves
+            them if they have one.
+
+        Returns
+        -------
+        float
+            What is left of the one that ends first among those for which the lane waits. Where a worker is
+            free, or soon will be, the mean of the lane's last durations over the workers that it can have.
+        """
+        busy = tuple(running)
+        own = [each for each in busy if each[0] == lane]
+        if len(own) >= self._most[lane]:
+            seconds = min(self._rest(*each) for each in own)
+        elif len(busy) >= self._all:
+            seconds = min(self._rest(*each) for each in busy)
+        else:
+            seconds = self._mean(lane) / self._most[lane]
+        return max(1.0, seconds)
+
+    def _rest(self, lane: Lane, ran_s: float, left_s: float | None) -> float:
+        """Return how long a job that runs is expected to go on."""
+        mean = self._mean(lane)
+        # One that has run longer than others did is expected to go on for as long again.
+        rest = mean - ran_s if ran_s < mean else ran_s
+        return rest if left_s is None else min(rest, max(0.0, left_s))
+
+    def _mean(self, lane: Lane) -> float:
+        return fmean(self._durations[lane]) if self._durations[lane] else _UNMEASURED_DURATION_S
 
 
 class Writer:

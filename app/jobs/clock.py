@@ -8,16 +8,15 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
-_PAUSE_S = 0.1
-
 _log = logging.getLogger(__name__)
 
 
 class Clock:
-    """Tells the time by the system's clock as it was when the service was last idle, and what passed since.
+    """Tells the time by another clock as it was at a moment, and what passed since.
 
-    So a job's limit and its duration do not change with the system's clock while it waits or runs, and what
-    is stored of one job fits together.
+    So a job's limit and its duration do not change with that clock while it waits or runs, and what is stored
+    of one job fits together. The other clock is the system's, or that of a database which several services
+    share.
 
     Parameters
     ----------
@@ -37,9 +36,9 @@ class Clock:
         """Return the seconds since 1970."""
         return self._offset + self._steady()
 
-    def follow(self) -> None:
-        """Take over the system's time; only while no job waits or runs."""
-        self._offset = self._system() - self._steady()
+    def follow(self, now: float | None = None) -> None:
+        """Take over a time; None: the system's, only while no job waits or runs."""
+        self._offset = (self._system() if now is None else now) - self._steady()
 
 
 class Loop:
@@ -50,8 +49,8 @@ class Loop:
     step
         Does all there is to do now, and returns in how many seconds it is to be called again if nothing wakes
         the loop before; None: then only.
-    failure
-        What is logged if the step raises; it is called again after a pause.
+    failure, again_s
+        What is logged if the step raises, and after how many seconds it is called again.
 
     Attributes
     ----------
@@ -59,8 +58,10 @@ class Loop:
         Whether :meth:`end` was called.
     """
 
-    def __init__(self, step: Callable[[], Awaitable[float | None]], failure: str) -> None:
-        self._step, self._failure = step, failure
+    def __init__(
+        self, step: Callable[[], Awaitable[float | None]], failure: str, again_s: float = 0.1
+    ) -> None:
+        self._step, self._failure, self._again_s = step, failure, again_s
         self._woken = asyncio.Event()
         self.ended = False
 
@@ -81,7 +82,7 @@ class Loop:
                 pause_s = await self._step()
             except Exception:
                 _log.exception("%s; there will be another try", self._failure)
-                await asyncio.sleep(_PAUSE_S)
+                await asyncio.sleep(self._again_s)
             else:
                 await wait_for(self._woken, pause_s)
 

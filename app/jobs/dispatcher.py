@@ -12,24 +12,20 @@ import logging
 import random
 import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
 
 from structlog.contextvars import bind_contextvars
 
-from app.jobs.attempts import Attempt, Attempts, Writer, complete
-from app.jobs.capacity import REMEMBERED_DURATIONS, Capacity, QueueLimit
+from app.jobs.attempts import REMEMBERED_DURATIONS, Attempt, Attempts, Writer, complete
 from app.jobs.clock import Loop
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.events import EventStreams
 from app.jobs.executor import Execution, Executor
-from app.jobs.follow_up import FollowUps
 from app.jobs.maintenance import Maintenance
-from app.jobs.model import LANES, Idempotency, Job, JobKind, JobObserver, JobStatus, Lane, Load
-from app.jobs.overdue import OverdueJobs
-from app.jobs.peers import peers_on
-from app.jobs.queries import Claim
+from app.jobs.model import LANES, Idempotency, Job, JobObserver, JobStatus, Lane, Load
+from app.jobs.peers import Peers
+from app.jobs.reserve import Reserve
 from app.jobs.store import JobStore
 from app.logs import labels
 
@@ -41,16 +37,6 @@ _log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What a service allows, see :class:`app.jobs.service.JobService`."""
-
-    max_queued: Mapping[Lane, int]
-    overrun_grace_s: float
-    retention_s: float | None
-    lease_s: float
-
-
 class Dispatcher:
     """Everything of the service that changes jobs.
 
@@ -58,10 +44,10 @@ class Dispatcher:
     ----------
     store
         The job table.
-    executor, reserve, observer
+    executor, reserve, observer, overrun_grace_s, retention_s, lease_s
         As given to :class:`app.jobs.service.JobService`.
-    limits
-        What is allowed.
+    places
+        How many jobs may wait, by lane.
 
     Attributes
     ----------
@@ -77,22 +63,28 @@ class Dispatcher:
         executor: Executor,
         reserve: Executor | None,
         observer: JobObserver | None,
-        limits: Limits,
+        *,
+        places: Mapping[Lane, int],
+        overrun_grace_s: float,
+        retention_s: float | None,
+        lease_s: float,
     ) -> None:
-        self._store, self._limits, self._observer = store, limits, observer
-        self._grace_s = limits.overrun_grace_s
-        self._kinds = store.kinds
-        self._executor, self._reserve = executor, reserve
-        self.attempts, self.events = Attempts(), EventStreams(store, self.runs)
-        self._capacity, self._writer = Capacity(executor.capacity), Writer()
-        self._peers = peers_on(store.database, store.owner, limits.lease_s)
-        self._overdue = OverdueJobs(
-            self._answer_at_once, store.clock.now, lambda: reserve is not None and reserve.ready > 0
-        )
-        self._follow_ups = FollowUps(store, self._writer, reserve, self._has_spare)
-        rest = self._peers, self, limits.retention_s
+        self._store, self._observer = store, observer
+        self._places, self._grace_s = places, overrun_grace_s
+        self._executors = [executor] if reserve is None else [executor, reserve]
+        self._executor, self._kinds = executor, store.kinds
+        self.attempts, self.events = Attempts(executor.capacity), EventStreams(store, self.runs)
+        self._writer = Writer()
+        self._peers = Peers(store, lease_s)
+        self._reserve = Reserve(store, self._writer, reserve, self._answer_at_once, self._has_spare)
+        rest = self._peers, self, retention_s
         self._maintenance = Maintenance(store, self._writer, self.attempts, *rest)
         self._loop = Loop(self._dispatch, "no job could be taken from the queue")
+        # Who gets a free worker is decided for one job after the other.
+        self._choosing = asyncio.Lock()
+        # How often it was told that a job may wait, and for how many of these none was left. Only hints: the
+        # table says what waits, and one look too many finds nothing.
+        self._told, self._looked = 1, 0
         self._loops: list[asyncio.Task[None]] = []
         self._requests: set[asyncio.Task[Any]] = set()
         self._finishing: set[asyncio.Task[Any]] = set()
@@ -105,20 +97,18 @@ class Dispatcher:
         await self._maintenance.recover()
         for lane in LANES:
             durations = await self._writer.write(self._store.recent_durations, lane, REMEMBERED_DURATIONS)
-            self._capacity.ran(lane, durations)
+            self.attempts.ran(lane, durations)
         self._accepting = True
         await self._executor.start(self._loop.wake)
-        if self._reserve is not None:
-            await self._reserve.start(self._overdue.loop.wake)
-        loops = self._loop, self._overdue.loop, self._follow_ups.loop, self._maintenance.loop
+        await self._reserve.start()
+        loops = self._loop, self._reserve.answering, self._reserve.completing, *self._maintenance.loops
         self._loops = [asyncio.create_task(loop.run()) for loop in loops]
 
     async def stop(self, grace_s: float) -> None:
         """Take nothing in any more, and put back what still runs after ``grace_s`` seconds."""
         self._accepting = False
         self._loop.end()
-        self._overdue.loop.end()
-        self._follow_ups.end()
+        self._reserve.end()
         # What was begun is brought to its end: a cancelled task would leave behind what its thread commits.
         for begun in (self._requests, self._loops[:1]):
             if begun:
@@ -130,12 +120,12 @@ class Dispatcher:
         if self._finishing:
             await asyncio.wait(self._finishing, timeout=_SETTLE_S)
         self._ended = True
-        self._maintenance.loop.end()
+        for loop in self._maintenance.loops:
+            loop.end()
+        for executor in self._executors:
+            await executor.close()
         await asyncio.gather(*self._loops)
         await self._peers.leave(self._writer)
-        await self._executor.close()
-        if self._reserve is not None:
-            await self._reserve.close()
         await self._writer.close()
 
     async def admit(
@@ -159,32 +149,31 @@ class Dispatcher:
             request_id=labels().get("request_id"),
             key_id=labels().get("key_id"),
         )
-        admit = self._admit(kind, self._kinds[kind].lane, insert)
-        return await asyncio.shield(_spawn(admit, self._requests))
+        return await asyncio.shield(_spawn(self._admit(self._kinds[kind].lane, insert), self._requests))
 
-    async def _admit(
-        self, kind: str, lane: Lane, insert: Callable[..., tuple[Claim, bool]]
-    ) -> tuple[Job, bool]:
-        running = self._capacity.running
-        idle = not self.attempts and not any(running.values())
-        reserved = self._capacity.may_start(lane, self._executor.ready)
-        free_s = self._capacity.time_to_a_place(lane, self.attempts.times(self._store.clock.now()))
-        limit = QueueLimit(self._limits.max_queued[lane], free_s * random.uniform(1.0, _LATEST_RETURN))
-        running[lane] += reserved
+    async def _admit(self, lane: Lane, insert: Callable[..., tuple[Job, bool]]) -> tuple[Job, bool]:
+        async with self._choosing:
+            reserved = lane in self.attempts.may_start(self._executor.ready)
+            self.attempts.reserved[lane] += reserved
+        free_s = self.attempts.time_to_a_place(lane, self.attempts.times(self._store.clock.now()))
+        retry_after_s = free_s * random.uniform(1.0, _LATEST_RETURN)
         begins = False
         try:
-            claim, created = await self._writer.write(insert, run_now=reserved, limit=limit, idle=idle)
-            begins = created and claim.job.status is JobStatus.RUNNING
+            job, created = await self._writer.write(
+                insert, run_now=reserved, places=self._places[lane], retry_after_s=retry_after_s
+            )
+            begins = created and job.status is JobStatus.RUNNING
         finally:
+            self.attempts.reserved[lane] -= reserved
             if reserved and not begins:
-                self._give_back(lane)
+                self._loop.wake()
         if created:
-            _log.info("job taken in", extra={"job_id": claim.job.id, "kind": kind, "lane": lane})
+            _log.info("job taken in", extra={"job_id": job.id, "kind": job.kind, "lane": lane})
         if begins:
-            self._begin(claim)
+            self._begin(job)
         elif created:
-            self.moved(claim.job, claim.deadline)
-        return claim.job, created
+            self.moved(job)
+        return job, created
 
     async def cancel(self, job_id: str) -> Job:
         """Cancel a job, see :meth:`app.jobs.service.JobService.cancel`."""
@@ -213,30 +202,25 @@ class Dispatcher:
         return Load(
             capacity=self._executor.capacity,
             ready=self._executor.ready,
-            running=dict(self._capacity.running),
-            restarts=self._executor.restarts + (0 if self._reserve is None else self._reserve.restarts),
+            running=self.attempts.by_lane(),
+            restarts=sum(executor.restarts for executor in self._executors),
         )
 
-    def moved(self, job: Job, deadline: float | None = None, ran_s: float | None = None) -> None:
+    def moved(self, job: Job, ran_s: float | None = None) -> None:
         """Take note of a job that waits or has ended, and did not before; tell everybody who is interested.
 
         Parameters
         ----------
         job
             The job.
-        deadline
-            When its time is up, if it waits and that is known; by the service's clock.
         ran_s
             How long its last attempt took, if it has ended with one here.
         """
         if not job.status.finished:
-            kind = self._kinds.get(job.kind)
-            if deadline is not None and kind is not None and self._answers(kind):
-                self._overdue.watch(job.id, deadline, kind.effort(job.payload))
+            self._reserve.watch(job)
             self._peers.tell("waiting", job.lane)
-            self._look_in(job.lane)
+            self._look_for_one()
             return
-        self._overdue.forget(job.id)
         if (events := self.events.known(job.id)) is not None:
             events.end(job)
         self._peers.tell("ended", job.id)
@@ -251,79 +235,66 @@ class Dispatcher:
         """Stop an attempt whose job is to be cancelled."""
         attempt.stop(self._grace_s)
 
-    async def look(self) -> None:
-        """Look at all that waits in the table, whether something was told of it or not."""
-        waiting = await self._writer.write(self._store.waiting)
-        self._look_in(*(lane for lane, jobs in waiting.items() if jobs))
-        kinds = [kind.name for kind in self._kinds.values() if self._answers(kind)]
-        if kinds:
-            self._overdue.watch_only(await self._writer.write(self._store.deadlines, kinds))
+    def look(self) -> None:
+        """Look at all that waits in the table, of which nothing may have been told here."""
+        self._look_for_one()
+        self._reserve.answering.wake()
 
-    def _look_in(self, *lanes: Lane) -> None:
-        self._capacity.hint(lanes)
+    def _look_for_one(self) -> None:
+        self._told += 1
         self._loop.wake()
-
-    def _answers(self, kind: JobKind) -> bool:
-        """Say whether jobs of a kind are answered beside the workers when their time is up."""
-        return self._reserve is not None and kind.at_once is not None
 
     def _hear(self, what: str, of: str) -> None:
         """React to what another service told."""
         match what:
             case "waiting":
-                self._look_in(*(lane for lane in LANES if lane == of))
-            case "ended":
-                self._overdue.forget(of)
-                if (events := self.events.known(of)) is not None:
-                    events.notify()
+                self._look_for_one()
+            case "ended" if (events := self.events.known(of)) is not None:
+                events.notify()
             case "cancelled" if (attempt := self.attempts.of(of)) is not None:
                 self.stop_attempt(attempt)
             case "":
-                self._look_in(*LANES)
+                self.look()
                 self.events.notify()
 
     async def _dispatch(self) -> None:
         """Give free workers to the jobs that wait."""
-        while self._accepting and (lanes := self._capacity.begin_look(self._executor.ready)):
-            claim, more_wait = None, True
-            try:
-                claim = await self._writer.write(self._store.claim, lanes)
-                more_wait = claim is not None and claim.more_wait
-            finally:
-                self._capacity.end_look(None if claim is None else claim.job.lane)
-                self._capacity.hint(lanes if more_wait else ())
-            if claim is not None:
-                self._overdue.forget(claim.job.id)
-                self._begin(claim)
+        while self._accepting and self._looked < self._told:
+            async with self._choosing:
+                told, lanes = self._told, self.attempts.may_start(self._executor.ready)
+                job = await self._writer.write(self._store.claim, lanes) if lanes else None
+                if job is None:
+                    if lanes == LANES:
+                        self._looked = told
+                    return
+                self._begin(job)
 
     async def _answer_at_once(self, job_ids: Sequence[str]) -> dict[str, float]:
         """Answer jobs whose time is up while they wait, beside the workers; return the seconds each took."""
-        self._follow_ups.make_way()
         begun = time.monotonic()
-        claims = await self._writer.write(self._store.claim_these, job_ids)
+        claimed = await self._writer.write(self._store.claim_these, job_ids)
         # While one is brought onto the disk the next is being answered.
-        tasks = [self._begin(claim, at_once=True) for claim in claims]
+        tasks = [self._begin(job, at_once=True) for job in claimed]
         if tasks:
             await asyncio.wait(tasks)
         # Shared out evenly: some end together, and the time between two says little.
-        share = (time.monotonic() - begun) / max(1, len(claims))
-        return {claim.job.id: share for claim in claims}
+        share = (time.monotonic() - begun) / max(1, len(claimed))
+        return {job.id: share for job in claimed}
 
-    def _begin(self, claim: Claim, at_once: bool = False) -> asyncio.Task[None]:
+    def _begin(self, job: Job, at_once: bool = False) -> asyncio.Task[None]:
         """Hand a job to the executor, in the same step in which its commit became known here.
 
         So a cancellation, which is committed after it, finds it among the attempts.
         """
-        job, kind, now = claim.job, self._kinds[claim.job.kind], self._store.clock.now()
+        kind, now = self._kinds[job.kind], self._store.clock.now()
         executor, work = self._executor, kind.work
-        if at_once and self._reserve is not None and kind.at_once is not None:
-            executor, work = self._reserve, kind.at_once
-        events = self.events.open(job.id)
-        attempt = Attempt(job, claim.deadline, events, job.progress, now, time.monotonic(), at_once=at_once)
+        if at_once and kind.at_once is not None:
+            executor, work = self._executors[-1], kind.at_once
+        attempt = Attempt(job, self.events.open(job.id), job.progress, now, at_once=at_once)
         self.attempts.add(attempt)
         if self._observer is not None and job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
-        left = None if claim.deadline is None else claim.deadline - now
+        left = None if job.deadline is None else job.deadline - now
         attempt.execution = executor.submit(
             work, attempt.payload, time_left_s=left, on_progress=attempt.report, labels=job.labels
         )
@@ -352,24 +323,19 @@ class Dispatcher:
             if job is None:
                 _log.warning("a job went on without attempt %d", attempt.job.attempt)
             elif job.status is JobStatus.SUCCEEDED and not attempt.at_once:
-                self._capacity.ran(job.lane, [took])
+                self.attempts.ran(job.lane, [took])
             if job is not None and job.unfinished:
-                self._follow_ups.loop.wake()
+                self._reserve.completing.wake()
         self.attempts.remove(attempt)
+        self._loop.wake()
         if job is not None:
-            self.moved(job, attempt.deadline, took)
+            self.moved(job, took)
         if job is None or not job.status.finished:
             # It goes on later, or elsewhere: who listens has to look there.
             attempt.events.notify()
-        if not attempt.at_once:
-            self._give_back(attempt.job.lane)
 
     def _has_spare(self) -> bool:
-        return not self._overdue.busy and sum(self._capacity.running.values()) < self._executor.capacity
-
-    def _give_back(self, lane: Lane) -> None:
-        self._capacity.running[lane] -= 1
-        self._loop.wake()
+        return sum(self.attempts.by_lane().values()) < self._executor.capacity
 
 
 def _spawn(work: Coroutine[Any, Any, T], among: set[asyncio.Task[Any]]) -> asyncio.Task[T]:

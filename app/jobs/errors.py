@@ -31,8 +31,6 @@ class QueueFull(JobError):
             f"the queue of {lane} jobs is full ({limit} waiting); "
             f"a place is expected to be free in {retry_after_s:.0f} s"
         )
-        self.lane = lane
-        self.limit = limit
         self.retry_after_s = retry_after_s
 
 
@@ -48,7 +46,6 @@ class JobNotFound(JobError):
 
     def __init__(self, job_id: str) -> None:
         super().__init__(f"there is no job {job_id!r}")
-        self.job_id = job_id
 
 
 class UnknownJobKind(JobError):
@@ -56,7 +53,6 @@ class UnknownJobKind(JobError):
 
     def __init__(self, kind: str) -> None:
         super().__init__(f"there is no kind of job {kind!r}")
-        self.kind = kind
 
 
 class InvalidCursor(JobError):
@@ -64,7 +60,6 @@ class InvalidCursor(JobError):
 
     def __init__(self, cursor: str) -> None:
         super().__init__(f"{cursor!r} is not a cursor of a page of jobs")
-        self.cursor = cursor
 
 
 class IdempotencyMismatch(JobError):
@@ -72,7 +67,6 @@ class IdempotencyMismatch(JobError):
 
     def __init__(self, key: str, begun: str) -> None:
         super().__init__(f"idempotency key {key!r} was used with another body, for {begun}")
-        self.key = key
 
 
 INTERNAL_ERROR = "internal-error"

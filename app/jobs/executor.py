@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Protocol
 
-from app.jobs.clock import wait_for
 from app.jobs.model import Progress, WorkResult
 
 # The workers share the cores: one that starts threads of its own slows the others down, and itself.
@@ -55,6 +54,9 @@ class Lost:
 
 Outcome = Returned | Raised | Lost
 
+Message = Progress | Returned | Raised
+"""What a worker sends of a piece of work: every progress in its order, and then how it ended."""
+
 
 @dataclass(frozen=True, slots=True)
 class Work:
@@ -80,14 +82,11 @@ class Work:
 
 
 class Worker(Protocol):
-    """A worker as its slot sees it."""
+    """A worker as its slot sees it; it begins to start when it is made."""
 
     @property
     def name(self) -> str:
         """What the log calls it."""
-
-    async def warm_up(self) -> None:
-        """Start it and wait until it is warm; raises if it never becomes so."""
 
     async def stay(self) -> None:
         """Wait until it is gone."""
@@ -105,15 +104,21 @@ class Worker(Protocol):
         """End it, wherever it is; nothing happens if it is gone."""
 
     async def discard(self) -> None:
-        """End it and give back what belonged to it."""
+        """End it and wait for its end."""
 
 
 class Execution:
-    """One piece of work, from waiting for a worker to its outcome."""
+    """One piece of work, from waiting for a worker to its outcome.
+
+    Attributes
+    ----------
+    worker
+        Which does it; None while it waits for one.
+    """
 
     def __init__(self, executor: Executor, work: Work) -> None:
+        self.worker: Worker | None = None
         self._cancelled = False
-        self._worker: Worker | None = None
         self.task = asyncio.create_task(self._run(executor, work))
 
     async def outcome(self) -> Outcome:
@@ -128,27 +133,25 @@ class Execution:
     def cancel(self) -> None:
         """Ask the work to stop by itself."""
         self._cancelled = True
-        if self._worker is not None:
-            self._worker.cancel()
+        if self.worker is not None:
+            self.worker.cancel()
 
     def kill(self) -> None:
         """Kill the worker, or give up waiting for one; :class:`Lost` unless the work ended meanwhile."""
-        if self._worker is not None:
-            self._worker.kill()
+        if self.worker is not None:
+            self.worker.kill()
         else:
             self.task.cancel()
 
     async def _run(self, executor: Executor, work: Work) -> Outcome:
         outcome = None
         while outcome is None:
-            worker = self._worker = await executor.free.get()
-            executor.working.add(worker)
+            worker = self.worker = await executor.free.get()
             executor.divide()
             try:
                 outcome = await worker.run(work, self._cancelled)
             finally:
-                self._worker = None
-                executor.working.discard(worker)
+                self.worker = None
         if not isinstance(outcome, Lost):
             executor.free.put_nowait(worker)
             executor.divide()
@@ -178,10 +181,12 @@ class Executor(ABC):
     ----------
     capacity
         How many pieces of work run at a time when there is a place for every worker.
+    ready
+        How many workers are warm, whether they work or not.
     restarts
         How many workers have been replaced.
-    free, working
-        The warm workers that do nothing, and those that work.
+    free
+        The warm workers that do nothing.
     """
 
     def __init__(
@@ -196,21 +201,13 @@ class Executor(ABC):
     ) -> None:
         if slots < 1:
             raise ValueError(f"slots is {slots}, but at least one worker is needed")
-        self._warm_up = warm_up, niceness, *warm_up_arguments
+        first = {"hook": warm_up, "arguments": warm_up_arguments, "niceness": niceness}
+        self._warm_up = Work("app.jobs.worker:warm_up", first, {}, math.inf, lambda _progress: None)
         self._environment, self._log_level = dict(environment), log_level
-        self.capacity, self.restarts = slots, 0
+        self.capacity, self.ready, self.restarts = slots, 0, 0
         self.free: asyncio.Queue[Worker] = asyncio.Queue()
-        self.working: set[Worker] = set()
-        self._workers: set[Worker] = set()
-        self._ready: set[Worker] = set()
         self._executions: set[Execution] = set()
-        self._closing = asyncio.Event()
         self._keepers: list[asyncio.Task[None]] = []
-
-    @property
-    def ready(self) -> int:
-        """How many workers are warm, whether they work or not."""
-        return len(self._ready)
 
     async def start(self, on_ready: Callable[[], None]) -> None:
         """Begin to start the workers; ``on_ready`` is called for each, and for each that replaces one."""
@@ -243,56 +240,51 @@ class Executor(ABC):
 
     def divide(self) -> None:
         """Tell every worker that works how many workers' cores it may use: with its part of the idle ones."""
-        for worker in self.working:
-            worker.share(1.0 + self.free.qsize() // len(self.working))
+        working = [execution.worker for execution in self._executions if execution.worker is not None]
+        for worker in working:
+            worker.share(1.0 + self.free.qsize() // len(working))
 
     async def close(self) -> None:
         """Kill all workers; work that was not awaited is lost."""
-        self._closing.set()
         for execution in tuple(self._executions):
             execution.kill()
-        for worker in tuple(self._workers):
-            worker.kill()
-        await asyncio.gather(*self._keepers)
+        for keeper in self._keepers:
+            keeper.cancel()
+        await asyncio.gather(*self._keepers, return_exceptions=True)
 
     @abstractmethod
     def _new_worker(self) -> Worker:
-        """Make a worker that is not started yet."""
+        """Make a worker, which begins to start."""
 
     async def _keep_slot(self, on_ready: Callable[[], None]) -> None:
         """Keep one worker alive until the executor closes."""
         pause = _FIRST_PAUSE_S
-        while not self._closing.is_set():
-            if await self._live_once(on_ready):
+        while True:
+            try:
+                await self._live_once(on_ready)
                 pause = _FIRST_PAUSE_S
-            else:
-                await wait_for(self._closing, pause)
-                pause = min(2 * pause, _LONGEST_PAUSE_S)
-            self.restarts += not self._closing.is_set()
-
-    async def _live_once(self, on_ready: Callable[[], None]) -> bool:
-        """Start one worker and stay until it is gone; False if it never became warm."""
-        worker, begun = self._new_worker(), time.monotonic()
-        self._workers.add(worker)
-        try:
-            await worker.warm_up()
-            if not self._closing.is_set():
-                self._ready.add(worker)
-                self.free.put_nowait(worker)
-                on_ready()
-                took = round(time.monotonic() - begun, 1)
-                _log.info("a worker is ready", extra={"worker": worker.name, "seconds": took})
-                await worker.stay()
-                if not self._closing.is_set():
-                    _log.warning("a worker is gone and is replaced", extra={"worker": worker.name})
-        except Exception:
-            # Whatever the reason, the slot goes on trying.
-            if not self._closing.is_set():
+            except Exception:
+                # Whatever the reason, the slot goes on trying.
                 _log.exception("a worker could not be started; there will be another try")
-            return False
-        else:
-            return True
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, _LONGEST_PAUSE_S)
+            self.restarts += 1
+
+    async def _live_once(self, on_ready: Callable[[], None]) -> None:
+        """Start one worker and stay until it is gone; raises if it never becomes warm."""
+        worker, begun, warm = self._new_worker(), time.monotonic(), False
+        try:
+            outcome = await worker.run(self._warm_up, cancelled=False)
+            if not isinstance(outcome, Returned):
+                raise ChildProcessError(getattr(outcome, "traceback", "it has died"))
+            warm = True
+            self.ready += 1
+            self.free.put_nowait(worker)
+            on_ready()
+            took = round(time.monotonic() - begun, 1)
+            _log.info("a worker is ready", extra={"worker": worker.name, "seconds": took})
+            await worker.stay()
+            _log.warning("a worker is gone and is replaced", extra={"worker": worker.name})
         finally:
-            self._ready.discard(worker)
+            self.ready -= warm
             await worker.discard()
-            self._workers.discard(worker)

@@ -100,6 +100,8 @@ class JobSummary:
         UTC; ``started_at`` is of the newest attempt.
     has_artifact
         Whether the work left bytes behind.
+    deadline
+        When its time is up, by the service's clock; None for never.
     unfinished
         Whether its result is still to be completed.
     request_id, key_id
@@ -117,6 +119,7 @@ class JobSummary:
     started_at: datetime | None
     finished_at: datetime | None
     has_artifact: bool
+    deadline: float | None = None
     unfinished: bool = False
     request_id: str | None = None
     key_id: str | None = None

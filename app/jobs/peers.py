@@ -1,8 +1,8 @@
 """The other services on a job table: each shows that it lives, and they tell each other what happens.
 
-On SQLite a service has :class:`NoPeers`. On PostgreSQL what is told is only a hint to look, and may get lost:
-waiting jobs and dead owners are looked for once a lease, cancellations with every heartbeat, and those who
-wait for a job look at the table now and then.
+On SQLite there are none. On PostgreSQL what is told is only a hint to look, and may get lost: waiting jobs
+and dead owners are looked for once a lease, cancellations with every heartbeat, and those who wait for a job
+look at the table now and then.
 
 An owner that was not seen for a lease, by the database's clock, is dead, and its jobs are given back. If it
 lives on after all (it was suspended, or cut off), nothing is finished twice: its attempts are outdated from
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -21,7 +22,8 @@ import sqlalchemy as sa
 
 from app.jobs.attempts import Writer
 from app.jobs.model import JobStatus
-from app.jobs.queries import Announcements, Database
+from app.jobs.queries import Announcements
+from app.jobs.store import JobStore
 from app.jobs.tables import DATABASE_NOW, jobs, owners
 
 _CHANNEL = "allocator_jobs"
@@ -42,73 +44,41 @@ class OwnedJob(NamedTuple):
     cancel_requested: bool
 
 
-class NoPeers:
-    """There are no others: the database belongs to this service as long as it runs.
+class Peers:
+    """The services that share a database with this one.
 
     Parameters
     ----------
-    owner
-        This service.
+    store
+        The job table; its owner is this service.
+    lease_s
+        How long after it was seen last an owner counts as alive, in seconds.
+    clock
+        Seconds that pass here, by which this owner knows for how long it could not show itself.
 
     Attributes
     ----------
     lease_s
-        How long after it was seen last an owner counts as alive, in seconds.
+        The same; infinite where there can be no others.
     beat_s
-        Seconds between two heartbeats.
+        Seconds between two heartbeats; None where nobody waits for one.
     """
 
-    lease_s = beat_s = float("inf")
-
-    def __init__(self, owner: str) -> None:
-        self._owner = owner
-
-    async def join(self, writer: Writer, hear: Hear) -> None:
-        """Begin, before the first job is taken; ``hear`` is called on the event loop with what is told."""
-
-    async def leave(self, writer: Writer) -> None:
-        """End, after the last job was settled or put back."""
-
-    def beat(self) -> dict[str, OwnedJob]:
-        """Show that this service lives, and return the jobs that the table says it runs. Blocks."""
-        return {}
-
-    def is_alive(self, owner: str) -> bool:
-        """Say whether an owner can still finish its jobs. Blocks.
-
-        Every other one has ended, or the database would be occupied.
-        """
-        return owner == self._owner
-
-    def tell(self, what: News, of: str) -> None:
-        """Tell the others."""
-
-
-class PostgresPeers(NoPeers):
-    """The services that share a PostgreSQL database with this one.
-
-    Parameters
-    ----------
-    database
-        The database.
-    owner, lease_s
-        This service, and its lease.
-    clock
-        Seconds that pass here, by which this owner knows for how long it could not show itself.
-    """
-
-    def __init__(
-        self, database: Database, owner: str, lease_s: float, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        super().__init__(owner)
-        self._database, self._clock = database, clock
-        self.lease_s, self.beat_s = lease_s, lease_s / _BEATS_A_LEASE
+    def __init__(self, store: JobStore, lease_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._store, self._owner, self._clock = store, store.owner, clock
+        self.lease_s = lease_s if store.database.shared else math.inf
+        self.beat_s = lease_s / _BEATS_A_LEASE if store.database.shared else None
         self._announcements: Announcements | None = None
         self._beaten = float("-inf")
         self._judges_from = float("inf")
 
     async def join(self, writer: Writer, hear: Hear) -> None:
-        """Show this service among the living, and begin to listen."""
+        """Show this service among the living, and begin to listen, before the first job is taken.
+
+        What is told is given to ``hear`` on the event loop.
+        """
+        if not self._store.database.shared:
+            return
         await writer.write_with_retry(self.beat)
         loop = asyncio.get_running_loop()
 
@@ -117,17 +87,19 @@ class PostgresPeers(NoPeers):
             with contextlib.suppress(RuntimeError):  # the loop has ended
                 loop.call_soon_threadsafe(hear, what, of)
 
-        self._announcements = await asyncio.to_thread(self._database.announcements, _CHANNEL, heard)
+        self._announcements = await asyncio.to_thread(self._store.database.announcements, _CHANNEL, heard)
 
     async def leave(self, writer: Writer) -> None:
-        """Say nothing any more, and be forgotten."""
+        """Say nothing any more, and be forgotten, after the last job was settled or put back."""
         if self._announcements is not None:
             await asyncio.to_thread(self._announcements.close)
-        with contextlib.suppress(Exception):  # a server that is gone: the others will see that this one is
-            await writer.write(self.forget)
+            with contextlib.suppress(
+                Exception
+            ):  # a server that is gone: the others will see that this one is
+                await writer.write(self.forget)
 
     def beat(self) -> dict[str, OwnedJob]:
-        """Show that this service lives, and return the jobs that the table says it runs, by their id.
+        """Show that this service lives, and return the jobs that the table says it runs, by their id. Blocks.
 
         After a time in which it could not, the others could not either: no service counts as dead until all
         that live have had the time of a lease to show themselves.
@@ -135,35 +107,40 @@ class PostgresPeers(NoPeers):
         begun = self._clock()
         me, mine = owners.c.owner == self._owner, jobs.c.owner == self._owner
         running = sa.select(jobs.c.id, jobs.c.attempt, jobs.c.cancel_requested)
-        with self._database.write() as connection:
+        with self._store.database.write() as connection:
             if not connection.execute(sa.update(owners).where(me).values(seen_at=DATABASE_NOW)).rowcount:
                 connection.execute(sa.insert(owners).values(owner=self._owner, seen_at=DATABASE_NOW))
             rows = connection.execute(running.where(mine, jobs.c.status == JobStatus.RUNNING)).all()
+        self._store.follow_database()
         if begun - self._beaten > self.lease_s / 2:
             self._judges_from = begun + self.lease_s
         self._beaten = begun
         return {job_id: OwnedJob(attempt, cancel_requested) for job_id, attempt, cancel_requested in rows}
 
     def is_alive(self, owner: str) -> bool:
-        """Say whether an owner was seen within the lease; yes as long as this one must not judge."""
-        if owner == self._owner or self._clock() < self._judges_from:
+        """Say whether an owner can still finish its jobs: it was seen within the lease. Blocks.
+
+        Yes, as long as this one must not judge. Where there can be no others, all but this one have ended,
+        or the database would be occupied.
+        """
+        if owner == self._owner:
             return True
-        with self._database.read() as connection:
-            age = connection.scalar(sa.select(DATABASE_NOW - owners.c.seen_at).where(owners.c.owner == owner))
-        return age is not None and age <= self.lease_s
+        if not self._store.database.shared:
+            return False
+        if self._clock() < self._judges_from:
+            return True
+        age = sa.select(DATABASE_NOW - owners.c.seen_at).where(owners.c.owner == owner)
+        with self._store.database.read() as connection:
+            seen_before_s = connection.scalar(age)
+        return seen_before_s is not None and seen_before_s <= self.lease_s
 
     def forget(self) -> None:
-        """Remove this owner, and those that died so long ago that no job can be theirs."""
+        """Remove this owner, and those that died so long ago that no job can be theirs. Blocks."""
         forgotten = owners.c.seen_at < DATABASE_NOW - _FORGOTTEN_LEASES * self.lease_s
-        with self._database.write() as connection:
+        with self._store.database.write() as connection:
             connection.execute(sa.delete(owners).where(sa.or_(owners.c.owner == self._owner, forgotten)))
 
     def tell(self, what: News, of: str) -> None:
         """Tell the others."""
         if self._announcements is not None:
             self._announcements.tell(f"{what} {of}")
-
-
-def peers_on(database: Database, owner: str, lease_s: float) -> NoPeers:
-    """Return whom an owner shares a database with: nobody, or others."""
-    return PostgresPeers(database, owner, lease_s) if database.shared else NoPeers(owner)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,12 +18,13 @@ from app.jobs.clock import Clock
 from app.jobs.errors import InvalidCursor, JobNotFound
 from app.jobs.model import LANES, Job, JobPage, JobStatus, JobSummary, Lane, Progress
 from app.jobs.stored_json import read_later
-from app.jobs.tables import DATABASE_NOW, artifacts, jobs
+from app.jobs.tables import artifacts, jobs
 
 _MOST_UNFINISHED = 1000
 """Results that wait to be completed, at most; one more stays as it is."""
 
-_now = sa.select(DATABASE_NOW)
+_LEFT_ALONE_S = 60.0
+"""Of another service that shares the database: its results are completed by this one after so long."""
 
 Row = RowMapping | dict[str, Any]
 
@@ -81,25 +81,6 @@ class Database(Protocol):
         """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A job that was taken to be run.
-
-    Attributes
-    ----------
-    job
-        The job.
-    deadline
-        When its time is up, by the service's clock.
-    more_wait
-        Whether there are others where it was looked for.
-    """
-
-    job: Job
-    deadline: float | None
-    more_wait: bool = False
-
-
 class JobQueries:
     """Reads the job table.
 
@@ -118,15 +99,6 @@ class JobQueries:
 
     def __init__(self, database: Database, clock: Clock) -> None:
         self.database, self.clock = database, clock
-
-    def _times(self, connection: Connection) -> tuple[float, float]:
-        """Return the time by the clock of the table, and how many seconds the service's is ahead of that.
-
-        It is the one that all who write to the table share, in seconds since 1970.
-        """
-        mine = self.clock.now()
-        now = float(connection.execute(_now).scalar_one()) if self.database.shared else mine
-        return now, mine - now
 
     def get(self, job_id: str) -> Job:
         """Return a job.
@@ -210,8 +182,21 @@ class JobQueries:
             jobs.c.status == JobStatus.QUEUED, jobs.c.deadline.is_not(None), jobs.c.kind.in_(list(kinds))
         )
         with self.database.read() as connection:
-            _, ahead = self._times(connection)
-            return {row.id: row.deadline + ahead for row in connection.execute(statement)}
+            return {row.id: row.deadline for row in connection.execute(statement)}
+
+    def next_unfinished(self, owner: str) -> Job | None:
+        """Return the ended job whose result an owner is to complete next; None if there is none.
+
+        Those for which most tries were in vain come last.
+        """
+        statement = select_jobs.where(jobs.c.unfinished.is_not(None))
+        if self.database.shared:
+            left_alone = jobs.c.finished_at < self.clock.now() - _LEFT_ALONE_S
+            statement = statement.where(sa.or_(jobs.c.owner == owner, left_alone))
+        statement = statement.order_by(jobs.c.unfinished, jobs.c.number).limit(1)
+        with self.database.read() as connection:
+            row = connection.execute(statement).mappings().first()
+        return None if row is None else job_of(row)
 
     def recent_durations(self, lane: Lane, limit: int) -> list[float]:
         """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
@@ -273,13 +258,7 @@ def summary_of(row: Row) -> JobSummary:
     return JobSummary(**_summary(row))
 
 
-def claim_of(row: Row, ahead: float, more_wait: bool = False) -> Claim:
-    """Return the claim to the job of a row; the service's clock is ``ahead`` of the one of its deadline."""
-    deadline = None if row["deadline"] is None else row["deadline"] + ahead
-    return Claim(job_of({"has_artifact": False, **row}), deadline, more_wait)
-
-
-_AS_STORED = "id", "kind", "lane", "error", "attempt", "request_id", "key_id"
+_AS_STORED = "id", "kind", "lane", "error", "attempt", "deadline", "request_id", "key_id"
 _TIMES = "created_at", "started_at", "finished_at"
 
 

@@ -26,10 +26,9 @@ from typing import Any
 
 from app.jobs import worker
 from app.jobs.errors import describe
-from app.jobs.executor import Executor, Lost, Outcome, Raised, Work
+from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Returned, Work
 from app.jobs.model import Progress
 from app.jobs.work_context import WorkContext
-from app.jobs.worker import Ended, clean
 from app.logs import configure_worker_logs
 
 REPORT_INTERVAL_S = 0.5
@@ -124,7 +123,7 @@ class RayExecutor(Executor):
             max_restarts=0,
             runtime_env={"env_vars": self._environment},
         )
-        return _Worker(self._ray, actor.remote(self._log_level), self._warm_up)
+        return _Worker(self._ray, actor.remote(self._log_level))
 
 
 @contextlib.contextmanager
@@ -144,15 +143,12 @@ def _kept_signals() -> Iterator[None]:
 class _Worker:
     """A worker actor as the executor sees it."""
 
-    def __init__(self, ray: ModuleType, actor: Any, warm_up: tuple[Any, ...]) -> None:
-        self._ray, self._actor, self._warm_up = ray, actor, warm_up
+    def __init__(self, ray: ModuleType, actor: Any) -> None:
+        self._ray, self._actor = ray, actor
         self.name: str = actor._actor_id.hex()[:12]
-        self.gone = False
+        self._gone = False
         self._serial = 0
         self._newest: Progress | None = None
-
-    async def warm_up(self) -> None:
-        await self._actor.warm_up.remote(*self._warm_up)
 
     async def stay(self) -> None:
         """Wait until the process is gone."""
@@ -161,26 +157,27 @@ class _Worker:
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the actor was gone before."""
-        if self.gone:
+        if self._gone:
             return None
         self._serial, self._newest = next(_serials), None
         left = None if math.isinf(work.deadline) else work.deadline - time.monotonic()
         listening = asyncio.create_task(self._listen(self._serial, work.on_progress))
-        call = work.labels, work.function, work.payload
+        call = work.labels, work.function, work.payload, left, cancelled
         try:
-            ended: Ended = await self._actor.run.remote(self._serial, *call, left, cancelled)
+            progress, outcome = await self._actor.run.remote(self._serial, *call)
         except Exception as error:
             errors = self._ray.exceptions
             if isinstance(error, errors.RayError) and not isinstance(error, errors.RayTaskError):
-                self.gone = True
+                self._gone = True
                 return Lost(f"worker {self.name} is gone: {type(error).__name__}")
             # What was to be sent, or what came back, cannot be pickled; the worker is well.
             return Raised(describe(error), traceback.format_exc())
         finally:
             listening.cancel()
-        if ended.progress is not None and ended.progress != self._newest:
-            work.on_progress(ended.progress)
-        return ended.outcome
+        if progress is not None and progress != self._newest:
+            work.on_progress(progress)
+        ended: Outcome = outcome
+        return ended
 
     async def _listen(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
         """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
@@ -205,14 +202,14 @@ class _Worker:
             self._ray.kill(self._actor)
 
     async def discard(self) -> None:
-        self.gone = True
+        self._gone = True
         self.kill()
 
 
 class RayWorker:
     """A worker of the cluster.
 
-    The work runs in one thread, calls about it in others; what they share is guarded by a condition.
+    The work is done in one thread, calls about it come in others; what they share is guarded by a condition.
 
     Parameters
     ----------
@@ -224,15 +221,11 @@ class RayWorker:
         if log_level is not None:
             configure_worker_logs(log_level)
         self._changed = threading.Condition()
-        self._serial = 0
-        self._context = WorkContext.in_process(lambda _progress: None)
-        self._latest: Progress | None = None
-        self._count = 0
-        self._cancelled = 0
-
-    def warm_up(self, *arguments: Any) -> None:
-        """Make the first piece of work as quick as the later ones."""
-        worker.warm_up(*arguments)
+        self._reporter = worker.Reporter(self._take, worker.REPORT_INTERVAL_S)
+        self._context = WorkContext(self._reporter.report)
+        self._serial = self._cancelled = self._count = 0
+        self._progress: Progress | None = None
+        self._outcome: Returned | Raised | None = None
 
     def stay(self) -> None:
         """Never return: a caller that waits for it learns that this process has died."""
@@ -246,8 +239,8 @@ class RayWorker:
         payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
-    ) -> Ended:
-        """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
+    ) -> tuple[Progress | None, Returned | Raised | None]:
+        """Do one piece of work, and return its last progress and its outcome.
 
         Parameters
         ----------
@@ -262,24 +255,25 @@ class RayWorker:
         cancelled
             Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
-
-        def report(progress: Progress) -> None:
-            with self._changed:
-                self._latest = progress
-                self._count += 1
-                self._changed.notify_all()
-
-        context = WorkContext.in_process(report, time_left_s)
+        context = WorkContext.in_process(self._reporter.report, time_left_s)
         with self._changed:
-            self._serial, self._context, self._latest, self._count = serial, context, None, 0
+            self._serial, self._context, self._progress, self._count = serial, context, None, 0
             if cancelled or self._cancelled == serial:
                 context.cancel()
-        outcome = worker.perform(labels, work, payload, context)
+        worker.perform(labels, work, payload, context, self._reporter)
         with self._changed:
-            last = self._latest
-            self._serial, self._latest = -serial, None
+            self._serial = -serial
             self._changed.notify_all()
-        return Ended(outcome, None if last is None else clean(last))
+            return self._progress, self._outcome
+
+    def _take(self, message: Message) -> None:
+        """Take note of what the work sends."""
+        with self._changed:
+            if isinstance(message, Progress):
+                self._progress, self._count = message, self._count + 1
+                self._changed.notify_all()
+            else:
+                self._outcome = message
 
     def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
         """Wait until the work has reported more than ``count`` times; None once it has ended.
@@ -293,9 +287,9 @@ class RayWorker:
 
         with self._changed:
             self._changed.wait_for(has_news)
-            if self._serial != serial or self._latest is None:
+            if self._serial != serial or self._progress is None:
                 return None
-            return self._count, clean(self._latest)
+            return self._count, self._progress
 
     def cancel(self, serial: int) -> None:
         """Ask the work to stop; also if it has been sent and not begun."""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import platform
 import time
+import uuid
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from app.jobs.clock import Clock, wait_for
-from app.jobs.dispatcher import Dispatcher, Limits
+from app.jobs.dispatcher import Dispatcher
 from app.jobs.executor import Executor
 from app.jobs.model import (
     LANES,
@@ -25,7 +28,6 @@ from app.jobs.model import (
     Lane,
     Load,
 )
-from app.jobs.owner import new_owner
 from app.jobs.queries import Database
 from app.jobs.store import JobStore
 
@@ -85,9 +87,18 @@ class JobService:
     ) -> None:
         places = dict.fromkeys(LANES, max_queued if isinstance(max_queued, int) else _PLACES)
         places = places if isinstance(max_queued, int) else {**places, **max_queued}
-        limits = Limits(places, overrun_grace_s, retention_s, lease_s)
-        self._store = JobStore(database, new_owner(), max_attempts, kinds, Clock())
-        self._dispatcher = Dispatcher(self._store, executor, reserve, observer, limits)
+        owner = f"{platform.node()}:{os.getpid()}:{uuid.uuid4().hex[:12]}"
+        self._store = JobStore(database, owner, max_attempts, kinds, Clock())
+        self._dispatcher = Dispatcher(
+            self._store,
+            executor,
+            reserve,
+            observer,
+            places=places,
+            overrun_grace_s=overrun_grace_s,
+            retention_s=retention_s,
+            lease_s=lease_s,
+        )
         self._database, self._attempts = database, self._dispatcher.attempts
         self._events, self._runs = self._dispatcher.events, self._dispatcher.runs
         # Where nobody else can change a job, nothing happens to it that its events do not tell.

@@ -14,7 +14,6 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +21,18 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
 from app.jobs import queries
-from app.jobs.capacity import QueueLimit
 from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull, failure
 from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
-from app.jobs.queries import Claim, Database, JobQueries
+from app.jobs.queries import Database, JobQueries
 from app.jobs.stored_json import read_later
-from app.jobs.tables import artifacts, idempotency_keys, jobs
+from app.jobs.tables import DATABASE_NOW, artifacts, idempotency_keys, jobs
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
+_UNFINISHED = JobStatus.QUEUED, JobStatus.RUNNING
 _QUEUED, _RUNNING = jobs.c.status == JobStatus.QUEUED, jobs.c.status == JobStatus.RUNNING
 # Of each lane the job that has waited longest; one that another dispatcher is about to take is passed over,
 # where they do not take turns.
@@ -56,7 +55,7 @@ class JobStore(JobQueries):
     database
         Where the tables are.
     owner
-        Recorded with every job that is taken, see :mod:`app.jobs.owner`.
+        Recorded with every job that is taken: the service, by a name that no other one has.
     max_attempts
         How often a job may be lost with its worker or its owner; then it fails.
     kinds
@@ -85,6 +84,13 @@ class JobStore(JobQueries):
     def migrate(self) -> None:
         """Make the tables, or bring them to this version."""
         self.database.migrate(MIGRATIONS, VERSION_TABLE)
+        self.follow_database()
+
+    def follow_database(self) -> None:
+        """Take over the time of a database that several services share."""
+        if self.database.shared:
+            with self.database.read() as connection:
+                self.clock.follow(connection.scalar(sa.select(DATABASE_NOW)))
 
     def insert(
         self,
@@ -92,13 +98,13 @@ class JobStore(JobQueries):
         payload: Mapping[str, Any],
         *,
         run_now: bool,
-        limit: QueueLimit,
-        idle: bool = False,
+        places: int,
+        retry_after_s: float = 1.0,
         time_limit_s: float | None = None,
         idempotency: Idempotency | None = None,
         request_id: str | None = None,
         key_id: str | None = None,
-    ) -> tuple[Claim, bool]:
+    ) -> tuple[Job, bool]:
         """Add a job, or find the one that was added with the same idempotency key.
 
         Parameters
@@ -106,10 +112,8 @@ class JobStore(JobQueries):
         run_now
             A worker is reserved: the job begins as running, which saves the transaction that takes it, unless
             another waits that comes before it.
-        limit
-            Of the queue, where it has to wait.
-        idle
-            Nothing runs here: where nothing waits either, the clock takes over the system's time.
+        places, retry_after_s
+            How many may wait in its lane, where it has to, and when one more is expected to have a place.
         request_id, key_id
             The request that asks for it, and its API key.
 
@@ -127,19 +131,18 @@ class JobStore(JobQueries):
         """
         with self.database.write() as connection:
             if idempotency is not None:
-                known = self._known(connection, idempotency)
+                known = claim_key(self.database, connection, idempotency_keys, idempotency)
                 if known is not None:
-                    return known, False
-            nothing_waits = idle and not self._waits(connection, LANES)
-            if nothing_waits:
+                    return queries.job_of(queries.find(connection, known, queries.select_jobs)), False
+            if not (self.database.shared or _is_there(connection, jobs.c.status.in_(_UNFINISHED))):
                 self.clock.follow()
-            elif run_now:
-                run_now = not self._waits(connection, LANES[: LANES.index(kind.lane) + 1])
-            if not run_now:
+            before = jobs.c.lane.in_(LANES[: LANES.index(kind.lane) + 1])
+            if not run_now or _is_there(connection, _QUEUED, before):
+                run_now = False
                 self.database.take_turn(connection, f"queue {kind.lane}")
-                if queries.waiting_in(connection, kind.lane) >= limit.places:
-                    raise QueueFull(kind.lane, limit.places, limit.retry_after_s)
-            now, ahead = self._times(connection)
+                if queries.waiting_in(connection, kind.lane) >= places:
+                    raise QueueFull(kind.lane, places, retry_after_s)
+            now = self.clock.now()
             row: dict[str, Any] = {
                 **dict.fromkeys(jobs.c.keys()[1:]),
                 **queries.progress_columns(Progress()),
@@ -161,42 +164,28 @@ class JobStore(JobQueries):
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
                 keep(connection, idempotency_keys, idempotency, row["id"])
-        return queries.claim_of(row, ahead), True
+        return queries.job_of({**row, "has_artifact": False}), True
 
-    def _waits(self, connection: Connection, lanes: Iterable[Lane]) -> bool:
-        """Say whether a job waits in one of the lanes."""
-        return connection.scalar(_one_in(tuple(lanes))) is not None
-
-    def _known(self, connection: Connection, idempotency: Idempotency) -> Claim | None:
-        job_id = claim_key(self.database, connection, idempotency_keys, idempotency)
-        if job_id is None:
-            return None
-        row = queries.find(connection, job_id, queries.select_jobs)
-        return queries.claim_of(row, self._times(connection)[1])
-
-    def claim(self, lanes: Sequence[Lane]) -> Claim | None:
+    def claim(self, lanes: Sequence[Lane]) -> Job | None:
         """Take the job that has waited longest in the first of the lanes that has one; None if none has."""
         first = sa.func.coalesce(*(_OLDEST[lane] for lane in lanes), sa.null())
-        return next(iter(self._take(jobs.c.number == first, lanes)), None)
+        return next(iter(self._take(jobs.c.number == first)), None)
 
-    def claim_these(self, job_ids: Sequence[str]) -> list[Claim]:
+    def claim_these(self, job_ids: Sequence[str]) -> list[Job]:
         """Take jobs out of their turn; those that wait, in the order of their deadlines."""
-        claims = self._take(jobs.c.id.in_(job_ids))
-        return sorted(claims, key=lambda claim: claim.deadline or 0.0)
+        return sorted(self._take(jobs.c.id.in_(job_ids)), key=lambda job: job.deadline or 0.0)
 
-    def _take(self, which: sa.ColumnElement[bool], lanes: Sequence[Lane] = ()) -> list[Claim]:
+    def _take(self, which: sa.ColumnElement[bool]) -> list[Job]:
         with self.database.write() as connection:
-            now, ahead = self._times(connection)
+            now = self.clock.now()
             # An earlier process may have had another idea of the time.
             started_at = sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now)
             begins = {"status": JobStatus.RUNNING, "attempt": jobs.c.attempt + 1, "owner": self.owner}
             take = sa.update(jobs).where(which, _QUEUED).values(**begins, started_at=started_at)
-            rows = connection.execute(take.returning(*queries.whole)).mappings().all()
+            rows = connection.execute(take.returning(*queries.whole, queries.has_artifact)).mappings().all()
             if not rows:
                 connection.rollback()  # nothing is there to be committed
-                return []
-            more_wait = bool(lanes) and self._waits(connection, lanes)
-        return [queries.claim_of(row, ahead, more_wait) for row in rows]
+        return [queries.job_of(row) for row in rows]
 
     def succeed(self, job_id: str, attempt: int, work: WorkResult, progress: Progress) -> Job | None:
         """Store what the work returned; the job has succeeded, or is cancelled if that was asked for.
@@ -284,7 +273,7 @@ class JobStore(JobQueries):
                 values["error"] = failure("worker-lost", f"{crash}; given up after {crashes} attempts")
         if status.finished:
             # An earlier process may have had another idea of the time.
-            values["finished_at"] = max(self._times(connection)[0], row["started_at"] or row["created_at"])
+            values["finished_at"] = max(self.clock.now(), row["started_at"] or row["created_at"])
             kind = self.kinds.get(row["kind"])
             if kind is not None and kind.dropped_fields:
                 payload = read_later(row["payload"]).items()
@@ -324,6 +313,35 @@ class JobStore(JobQueries):
                 error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
                 changed.append(self._move(connection, row, JobStatus.FAILED, error=error))
         return changed
+
+    def complete_result(
+        self, job_id: str, attempt: int, fields: Mapping[str, Any], *, failed: bool = False
+    ) -> bool:
+        """Store the fields of an ended job's result that complete it.
+
+        Parameters
+        ----------
+        fields
+            The fields.
+        failed
+            The try was in vain. The result gets the fields after the last one, as often as a job may be lost.
+
+        Returns
+        -------
+        bool
+            False if the result was completed by another, or the job is no more.
+        """
+        ended = jobs.c.status.in_(FINISHED), jobs.c.unfinished.is_not(None)
+        unfinished = queries.select_to_change.where(jobs.c.id == job_id, jobs.c.attempt == attempt, *ended)
+        with self.database.write() as connection:
+            row = connection.execute(unfinished).mappings().first()
+            if row is None:
+                return False
+            values: dict[str, Any] = {"unfinished": row["unfinished"] + 1}
+            if not failed or values["unfinished"] >= self.max_attempts:
+                values = {"result": {**read_later(row["result"]), **fields}, "unfinished": None}
+            connection.execute(sa.update(jobs).where(jobs.c.number == row["number"]).values(values))
+        return True
 
     def save_progress(self, items: Iterable[tuple[str, int, Progress]]) -> None:
         """Store the newest progress of running jobs, given as id, attempt and progress."""
@@ -378,8 +396,5 @@ class JobStore(JobQueries):
             return connection.execute(sa.delete(jobs).where(oldest, jobs.c.status.in_(FINISHED))).rowcount
 
 
-@cache
-def _one_in(lanes: tuple[Lane, ...]) -> sa.Select[int]:
-    """Select something if a job waits in one of the lanes."""
-    in_one = sa.or_(*(jobs.c.lane == lane for lane in lanes))
-    return sa.select(sa.literal(1)).where(_QUEUED, in_one).limit(1)
+def _is_there(connection: Connection, *which: sa.ColumnElement[bool]) -> bool:
+    return connection.scalar(sa.select(sa.literal(1)).where(*which).limit(1)) is not None

@@ -1,10 +1,11 @@
-"""The worker's side: what runs in a process that the local executor has started.
+"""The worker's side: what runs in a process that does work, on this machine or on another.
 
 Nothing here imports SQLAlchemy, numpy, numba or torch: what the work needs comes with the work function.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import importlib
 import math
@@ -14,16 +15,16 @@ import signal
 import threading
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Mapping, MutableSequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from multiprocessing.connection import Connection, wait
-from types import MappingProxyType
 from typing import Any
 
 from app.jobs.errors import describe
-from app.jobs.executor import Raised, Returned
-from app.jobs.model import Progress
+from app.jobs.executor import Message, Raised, Returned
+from app.jobs.model import Progress, WorkResult
 from app.jobs.stored_json import written
 from app.jobs.work_context import WorkContext
 from app.logs import configure_worker_logs, labelled
@@ -32,63 +33,54 @@ from app.memory import give_back
 REPORT_INTERVAL_S = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """How a piece of work ended, and its last progress, which may not have gone through the pipe."""
-
-    outcome: Returned | Raised
-    progress: Progress | None
-
-
-class _Reporter:
-    """Sends the newest progress through the pipe, at most one every ``REPORT_INTERVAL_S``.
+class Reporter:
+    """Sends the newest progress of work, at most one every interval, and after the last one its outcome.
 
     The sending is a thread's, so that the work never waits for the reader, and so that the newest progress
     goes out in time even if the work reports nothing after it for long.
+
+    Parameters
+    ----------
+    send
+        Brings a message to the executor; one thread at a time calls it.
+    interval_s
+        Between two progresses.
     """
 
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-        self._lock = threading.Lock()
-        self._news = threading.Event()
-        self._serial = 0
-        self._latest: Progress | None = None
-        self._unsent: Progress | None = None
-        threading.Thread(target=self._send, name="progress", daemon=True).start()
-
-    def begin(self, serial: int) -> None:
-        with self._lock:
-            self._serial = serial
-            self._latest = self._unsent = None
+    def __init__(self, send: Callable[[Message], None], interval_s: float) -> None:
+        self._send, self._interval_s = send, interval_s
+        self._unsent: deque[Progress] = deque(maxlen=1)
+        self._news, self._sending = threading.Event(), threading.Lock()
+        threading.Thread(target=self._send_progress, name="progress", daemon=True).start()
 
     def report(self, progress: Progress) -> None:
-        with self._lock:
-            self._latest = self._unsent = progress
+        """Take note of progress."""
+        self._unsent.append(progress)
         self._news.set()
 
-    def end(self) -> Progress | None:
-        """Stop reporting the work that ends, and return its last progress."""
-        with self._lock:
-            self._unsent = None
-            return None if self._latest is None else clean(self._latest)
+    def finish(self, outcome: Returned | Raised) -> None:
+        """Send what is not sent yet, and the outcome."""
+        with self._sending:
+            self._send_newest()
+            self._send(outcome)
 
-    def _send(self) -> None:
+    def _send_progress(self) -> None:
         while True:
             self._news.wait()
             self._news.clear()
-            with self._lock:
-                serial, progress = self._serial, self._unsent
-                self._unsent = None
-            if progress is None:
-                continue
             try:
-                self._pipe.send((serial, clean(progress)))
+                with self._sending:
+                    self._send_newest()
             except OSError:
                 return
-            time.sleep(REPORT_INTERVAL_S)
+            time.sleep(self._interval_s)
+
+    def _send_newest(self) -> None:
+        if self._unsent:
+            self._send(_clean(self._unsent.pop()))
 
 
-def clean(progress: Progress) -> Progress:
+def _clean(progress: Progress) -> Progress:
     """Return a progress of plain JSON numbers: a reward may be minus infinity until a plan is found."""
     reward = progress.best_reward
     plan = progress.assignment
@@ -101,22 +93,18 @@ def clean(progress: Progress) -> Progress:
     )
 
 
-# A pool's initializer can hand over to its calls only through the module; a worker has exactly one.
-_equipment: list[tuple[_Reporter, MutableSequence[float]]] = []
-
-
-def initialize(
+def main(
     pipe: Connection,
     control: MutableSequence[float],
-    log_level: str | None = None,
-    environment: Mapping[str, str] = MappingProxyType({}),
+    log_level: str | None,
+    environment: Mapping[str, str],
 ) -> None:
-    """Prepare this process: it dies with its parent, and leaves Ctrl-C to it.
+    """Be a worker of this machine: it dies with its parent, and leaves Ctrl-C to it.
 
     Parameters
     ----------
     pipe
-        Where progress goes, as pairs of serial number and :class:`Progress`.
+        Where work comes from, and messages about it go to.
     control
         Shared with the parent, see :class:`app.jobs.work_context.WorkContext`.
     log_level
@@ -129,7 +117,12 @@ def initialize(
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, name="parent-watch", daemon=True).start()
-    _equipment.append((_Reporter(pipe), control))
+    reporter = Reporter(pipe.send, REPORT_INTERVAL_S)
+    context = WorkContext(reporter.report, control)
+    with contextlib.suppress(EOFError, OSError):  # the parent has gone
+        while True:
+            labels, work, payload = pipe.recv()
+            perform(labels, work, payload, context, reporter)
 
 
 def _die_with_parent() -> None:
@@ -140,33 +133,10 @@ def _die_with_parent() -> None:
         os._exit(1)
 
 
-def warm_up(hook: str | None, niceness: int, *arguments: Any) -> int:
-    """Make the first piece of work as quick as the later ones.
-
-    Parameters
-    ----------
-    hook, arguments
-        What does so, and what it gets.
-    niceness
-        By how much the work that comes leaves the cores to others, as the system counts it.
-
-    Returns
-    -------
-    int
-        The process id.
-    """
-    if hook is not None:
-        resolve(hook)(*arguments)
-    # What is there now stays: to look through it for garbage would only hold up somebody's work.
-    gc.collect()
-    gc.freeze()
-    give_back()
-    os.nice(niceness)
-    return os.getpid()
-
-
-def run(labels: dict[str, str], work: str, payload: Mapping[str, Any], serial: int) -> Ended:
-    """Do one piece of work. Whatever it raises comes back as a value, so nothing depends on pickling it.
+def perform(
+    labels: dict[str, str], work: str, payload: Mapping[str, Any], context: WorkContext, reporter: Reporter
+) -> None:
+    """Do one piece of work. Whatever it raises is sent as a value, so nothing depends on pickling it.
 
     Parameters
     ----------
@@ -174,26 +144,39 @@ def run(labels: dict[str, str], work: str, payload: Mapping[str, Any], serial: i
         What the lines have that are logged meanwhile.
     work, payload
         ``"module:function"`` and what it gets.
-    serial
-        Tells the progress of this work from that of others.
+    context
+        What it gets besides.
+    reporter
+        Sends what comes of it.
     """
-    reporter, control = _equipment[0]
-    reporter.begin(serial)
-    outcome = perform(labels, work, payload, WorkContext(reporter.report, control))
-    return Ended(outcome, reporter.end())
-
-
-def perform(
-    labels: dict[str, str], work: str, payload: Mapping[str, Any], context: WorkContext
-) -> Returned | Raised:
-    """Call a work function, see :func:`run`, and return what came of it."""
     try:
         with labelled(labels):
             result = resolve(work)(payload, context)
         # A result that is no JSON must fail here, with a traceback, and not when it is stored.
-        return Returned(replace(result, result=written(result.result)))
+        reporter.finish(Returned(replace(result, result=written(result.result))))
     except BaseException as error:
-        return Raised(describe(error), traceback.format_exc())
+        reporter.finish(Raised(describe(error), traceback.format_exc()))
+
+
+def warm_up(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # noqa: ARG001 - nothing to report
+    """Make the work that comes as quick as what comes later: the first piece of work of every worker.
+
+    Parameters
+    ----------
+    payload
+        ``hook`` does so, and gets the ``arguments``; None: nothing. ``niceness`` is by how much the work that
+        comes leaves the cores to others, as the system counts it.
+    context
+        Of this work.
+    """
+    if payload["hook"] is not None:
+        resolve(payload["hook"])(*payload["arguments"])
+    # What is there now stays: to look through it for garbage would only hold up somebody's work.
+    gc.collect()
+    gc.freeze()
+    give_back()
+    os.nice(payload["niceness"])
+    return WorkResult({})
 
 
 @cache

@@ -17,7 +17,6 @@ from app.api.job_kinds import BATCH
 from app.api.metrics import Metrics
 from app.api.services import Services
 from app.jobs import events
-from app.jobs.capacity import QueueLimit
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobKind
 from app.jobs.service import JobService
@@ -213,8 +212,8 @@ def test_a_stream_that_goes_on_ends_when_its_key_is_revoked(keys, start, monkeyp
     services = service.app.state.services
     store = JobStore(services.database, "me", 3)
     kind = JobKind("solve", "nowhere:solve", "interactive")
-    waits, _ = store.insert(kind, {}, run_now=False, limit=QueueLimit(1, 1.0))
-    path = f"/jobs/{waits.job.id}/events"
+    waits, _ = store.insert(kind, {}, run_now=False, places=1)
+    path = f"/jobs/{waits.id}/events"
 
     async def scenario():
         transport = httpx.ASGITransport(service.app)

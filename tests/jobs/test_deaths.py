@@ -22,6 +22,7 @@ from harness import (
     running,
     url_of,
 )
+from live_service import has_exited, workers_of
 
 from app.jobs.local import LocalExecutor
 from app.jobs.model import JobStatus
@@ -29,13 +30,6 @@ from app.jobs.service import JobService
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-
-
-def has_exited(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
-    except OSError:
-        return True
 
 
 def test_a_job_survives_the_death_of_its_worker(tmp_path):
@@ -189,7 +183,7 @@ def test_workers_that_warm_up_hold_no_thread_that_requests_need(tmp_path):
         asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
         executor = LocalExecutor(3, warm_up="job_work:until_gate", environment={"GATE": str(gate)})
         await executor.start(lambda: None)
-        await eventually(lambda: all(each.pid is not None for each in executor._workers))
+        await eventually(lambda: len(workers_of(os.getpid())) == 3)
         # All three are warming up, and the only thread is free.
         assert await asyncio.wait_for(asyncio.to_thread(lambda: 1), PATIENCE_S) == 1
         assert executor.ready == 0

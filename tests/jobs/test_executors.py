@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import signal
 import sys
 from collections import Counter
 from contextlib import asynccontextmanager
@@ -214,6 +215,26 @@ def test_a_dead_worker_loses_its_own_work_and_is_replaced(new_executor, tmp_path
             assert executor.restarts == 2
             gate.touch()
             assert isinstance(await bystander.outcome(), Returned)
+
+    asyncio.run(scenario())
+
+
+def test_work_that_is_ended_on_its_way_to_a_worker_is_lost_and_not_done_by_another(tmp_path):
+    async def scenario():
+        executor, log = LocalExecutor(1), tmp_path / "log"
+        await executor.start(lambda: None)
+        await eventually(lambda: executor.ready == 1)
+        # It takes nothing more out of its pipe, which does not hold all of the payload.
+        pid = (await submit(executor, "echo")[0].outcome()).work.result["pid"]
+        os.kill(pid, signal.SIGSTOP)
+        stuck, _ = submit(executor, "note", {"log": str(log), "number": 1, "much": "x" * 10_000_000})
+        await eventually(lambda: stuck.worker is not None)
+        stuck.kill()
+        assert isinstance(await stuck.outcome(), Lost)
+        await eventually(lambda: executor.ready == 1 and executor.restarts == 1)
+        await submit(executor, "note", {"log": str(log), "number": 2})[0].outcome()
+        assert log.read_text().split() == ["2"]
+        await executor.close()
 
     asyncio.run(scenario())
 

@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from harness import KINDS, database_of, eventually, finished, running
 
-from app.jobs.capacity import QueueLimit
-from app.jobs.follow_up import UnfinishedResults
 from app.jobs.local import LocalExecutor
 from app.jobs.model import FollowUp, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore
@@ -102,72 +100,68 @@ TABLED = JobKind("later", "nowhere:later", "interactive", follow_up=OTHER_HALF)
 
 
 @pytest.fixture
-def table(any_database_url):
+def store(any_database_url):
     database = database_of(any_database_url)
     store = JobStore(database, "host:1:1:me", 3, [TABLED])
     store.migrate()
-    yield store, UnfinishedResults(store)
+    yield store
     database.dispose()
 
 
 def ended(store, *, cancel=False, unfinished=True):
-    claim, _ = store.insert(TABLED, {}, run_now=True, limit=QueueLimit(1, 1.0))
+    claim, _ = store.insert(TABLED, {}, run_now=True, places=1)
     if cancel:
-        store.cancel(claim.job.id)
-    return store.succeed(claim.job.id, 1, WorkResult(HALF, unfinished=unfinished), Progress())
+        store.cancel(claim.id)
+    return store.succeed(claim.id, 1, WorkResult(HALF, unfinished=unfinished), Progress())
 
 
-def test_only_results_that_wait_for_it_are_completed(table):
-    store, results = table
+def test_only_results_that_wait_for_it_are_completed(store):
     whole, cancelled, half = (
         ended(store, unfinished=False),
         ended(store, cancel=True),
         ended(store),
     )
     assert (whole.unfinished, cancelled.unfinished, half.unfinished) == (False, False, True)
-    assert results.next().id == half.id
+    assert store.next_unfinished(store.owner).id == half.id
     for job, result in ((whole, HALF), (cancelled, HALF | GIVEN_UP)):
-        assert not results.complete(job.id, 1, {"rest": 2})
+        assert not store.complete_result(job.id, 1, {"rest": 2})
         assert store.get(job.id).result == result
-    assert not results.complete(half.id, 2, {"rest": 2})
-    assert results.complete(half.id, 1, {"rest": 2})
+    assert not store.complete_result(half.id, 2, {"rest": 2})
+    assert store.complete_result(half.id, 1, {"rest": 2})
     assert store.get(half.id).result == {"half": 1, "rest": 2}
     # The second to come changes nothing.
-    assert not results.complete(half.id, 1, {"rest": 3})
+    assert not store.complete_result(half.id, 1, {"rest": 3})
     assert store.get(half.id).result == {"half": 1, "rest": 2}
-    assert results.next() is None
+    assert store.next_unfinished(store.owner) is None
 
 
-def test_a_deleted_job_is_not_completed(table):
-    store, results = table
+def test_a_deleted_job_is_not_completed(store):
     job = ended(store)
     store.expire(time.time() + 1.0, 10)
-    assert not results.complete(job.id, 1, {"rest": 2})
-    results.failed(job.id, 1, GIVEN_UP)
-    assert results.next() is None
+    assert not store.complete_result(job.id, 1, {"rest": 2})
+    store.complete_result(job.id, 1, GIVEN_UP, failed=True)
+    assert store.next_unfinished(store.owner) is None
 
 
-def test_those_that_failed_come_last_and_then_no_more(table):
-    store, results = table
+def test_those_that_failed_come_last_and_then_no_more(store):
     first, second = ended(store), ended(store)
-    results.failed(first.id, 1, GIVEN_UP)
-    assert results.next().id == second.id
-    results.failed(first.id, 1, GIVEN_UP)
+    store.complete_result(first.id, 1, GIVEN_UP, failed=True)
+    assert store.next_unfinished(store.owner).id == second.id
+    store.complete_result(first.id, 1, GIVEN_UP, failed=True)
     assert store.get(first.id).result == HALF
-    results.failed(first.id, 1, GIVEN_UP)
+    store.complete_result(first.id, 1, GIVEN_UP, failed=True)
     assert not store.get(first.id).unfinished
     assert store.get(first.id).result == HALF | GIVEN_UP
-    assert results.complete(second.id, 1, {})
-    assert results.next() is None
+    assert store.complete_result(second.id, 1, {})
+    assert store.next_unfinished(store.owner) is None
 
 
-def test_no_more_wait_than_there_are_places_for(table, monkeypatch):
-    store, results = table
+def test_no_more_wait_than_there_are_places_for(store, monkeypatch):
     monkeypatch.setattr("app.jobs.queries._MOST_UNFINISHED", 2)
     first, second, third = ended(store), ended(store), ended(store)
     assert [each.unfinished for each in (first, second, third)] == [True, True, False]
     assert third.result == HALF | GIVEN_UP
-    assert results.complete(results.next().id, 1, {})
+    assert store.complete_result(store.next_unfinished(store.owner).id, 1, {})
     assert ended(store).unfinished
 
 
@@ -176,9 +170,8 @@ def test_services_that_share_a_database_complete_their_own_first(postgresql, mon
     store = JobStore(database, "host:1:1:me", 3, [TABLED])
     store.migrate()
     job = ended(store)
-    other = UnfinishedResults(JobStore(database, "host:2:2:other", 3))
-    assert other.next() is None
-    assert UnfinishedResults(store).next().id == job.id
-    monkeypatch.setattr("app.jobs.follow_up._LEFT_ALONE_S", 0.0)
-    assert other.next().id == job.id
+    assert store.next_unfinished("host:2:2:other") is None
+    assert store.next_unfinished(store.owner).id == job.id
+    monkeypatch.setattr("app.jobs.queries._LEFT_ALONE_S", 0.0)
+    assert store.next_unfinished("host:2:2:other").id == job.id
     database.dispose()

@@ -82,7 +82,7 @@ async def main():
     await executor.start(lambda: None)
     while executor.ready < 2:
         await asyncio.sleep(0.01)
-    print(*(worker.pid for worker in executor._workers), flush=True)
+    print(*(worker.name for worker in executor.free._queue), flush=True)
     await asyncio.sleep(600)
 asyncio.run(main())
 """

@@ -2,85 +2,80 @@
 
 import asyncio
 import time
-from contextlib import asynccontextmanager
 
-import pytest
 import sqlalchemy as sa
-from harness import running
+from harness import database_of, eventually, make_service, url_of
 
-from app.jobs.attempts import Attempts
-from app.jobs.capacity import QueueLimit
-from app.jobs.maintenance import Maintenance
+from app.jobs import maintenance
 from app.jobs.model import JobKind, Progress, WorkResult
-from app.jobs.peers import NoPeers
+from app.jobs.store import JobStore
 from app.jobs.tables import jobs
 
 DAY_S = 86_400.0
 KIND = JobKind("echo", "nowhere:echo", "interactive")
 
 
-class Beats(NoPeers):
-    """Counts the heartbeats, which are always due."""
-
-    beat_s = 0.0
-    count = 0
-
-    def beat(self):
-        self.count += 1
-        return {}
-
-
-@pytest.fixture
-def maintained(tmp_path):
-    @asynccontextmanager
-    async def make():
-        async with running(tmp_path) as service:
-            dispatcher = service._dispatcher
-            store, peers = dispatcher._store, Beats("me")
-            chores = Maintenance(store, dispatcher._writer, Attempts(), peers, dispatcher, DAY_S)
-            yield chores, store, peers
-
-    return make
-
-
-def add_ended(store, count):
+def add_ended(database, count):
     """Add jobs that ended two days ago."""
+    store = JobStore(database, "earlier", 3, [KIND])
+    store.migrate()
     for _ in range(count):
-        claim, _ = store.insert(KIND, {}, run_now=True, limit=QueueLimit(count, 1.0), idempotency=None)
-        store.succeed(claim.job.id, 1, WorkResult({}), Progress())
+        job, _ = store.insert(KIND, {}, run_now=True, places=count)
+        store.succeed(job.id, 1, WorkResult({}), Progress())
     with store.database.write() as connection:
         connection.execute(sa.update(jobs).values(finished_at=time.time() - 2 * DAY_S))
+    return store
 
 
-def test_heartbeats_come_between_when_many_jobs_are_old(maintained):
-    async def scenario():
-        async with maintained() as (chores, store, peers):
-            add_ended(store, 120)
-            left = []
-            for _ in range(3):
-                left.append(len(store.page(200, None).jobs))
-                assert await chores._do_what_is_due() == 0.0
-            assert left == [120, 70, 20]
-            assert not store.page(200, None).jobs
-            assert peers.count == 3
+def maintained(tmp_path, ended, scenario):
+    """Run a scenario with a service that deletes jobs after a day, and shows all the time that it lives."""
+    database = database_of(url_of(tmp_path))
+    store = add_ended(database, ended)
 
-    asyncio.run(scenario())
+    async def run():
+        service = make_service(database, retention_s=DAY_S)
+        peers = service._dispatcher._peers
+        left = []
+
+        def beat():
+            left.append(len(store.page(200, None).jobs))
+            return {}
+
+        peers.beat_s, peers.beat = 0.0, beat
+        await service.start()
+        try:
+            await scenario(service, left)
+        finally:
+            await service.stop(0)
+            database.dispose()
+
+    asyncio.run(run())
 
 
-def test_a_chore_that_fails_is_tried_again_and_the_others_are_done(maintained, monkeypatch, caplog):
-    async def scenario():
-        async with maintained() as (chores, store, peers):
-            add_ended(store, 1)
+def test_heartbeats_come_between_when_many_jobs_are_old(tmp_path):
+    async def scenario(service, left):
+        await eventually(lambda: bool(left) and left[-1] == 0)
+        # Fifty are deleted at once, and no heartbeat waits for two such deletions.
+        assert {70, 20} <= set(left)
 
-            def fail(_is_alive):
-                raise RuntimeError("no")
+    maintained(tmp_path, 120, scenario)
 
-            with monkeypatch.context() as broken:
-                broken.setattr(store, "recover", fail)
-                await chores._do_what_is_due()
-            assert peers.count == 1
-            assert not store.page(10, None).jobs
-            assert "there will be another try" in caplog.text
-            assert chores._due_at[chores.recover] < time.monotonic() + 2.0
 
-    asyncio.run(scenario())
+def test_a_chore_that_fails_is_tried_again_and_the_others_are_done(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(maintenance, "_AGAIN_S", 0.01)
+    monkeypatch.setattr(maintenance, "_LOOK_INTERVAL_S", 0.01)
+
+    async def scenario(service, left):
+        tries = []
+
+        def fail(_is_alive):
+            tries.append(len(left))
+            raise RuntimeError("no")
+
+        with monkeypatch.context() as broken:
+            broken.setattr(service._store, "recover", fail)
+            await eventually(lambda: len(tries) > 2 and left[-1] == 0)
+            assert tries[-1] > tries[0]
+        assert "there will be another try" in caplog.text
+
+    maintained(tmp_path, 1, scenario)

@@ -8,7 +8,7 @@ from harness import KINDS, eventually, finished, running
 
 from app.jobs.local import LocalExecutor
 from app.jobs.model import BEST_KNOWN, JobKind, JobStatus
-from app.jobs.overdue import Pace, Wait, due, latest_start
+from app.jobs.reserve import Pace, Wait, due, latest_start
 
 HASTY = (
     *KINDS,

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 from harness import KINDS, finished, running
 
-from app.jobs.capacity import Capacity
+from app.jobs.attempts import Attempts
 from app.jobs.errors import QueueFull
 from app.jobs.model import JobKind, JobStatus
 
@@ -30,7 +30,7 @@ def test_a_full_queue_refuses_and_says_when_to_come_back(tmp_path):
 
 
 def test_retry_after_is_the_time_until_one_place_is_free():
-    lanes = Capacity(3)
+    lanes = Attempts(3)
     assert lanes.time_to_a_place("interactive", []) == 1.0
     lanes.ran("interactive", [4.0, 8.0])
     lanes.ran("training", [100.0])
@@ -47,7 +47,7 @@ def test_retry_after_is_the_time_until_one_place_is_free():
 
 
 def test_retry_after_believes_what_runs_longer_than_what_ran():
-    lanes = Capacity(1)
+    lanes = Attempts(1)
     lanes.ran("interactive", [0.1, 0.1])
     # It goes on for as long again, unless its time limit ends it.
     assert lanes.time_to_a_place("interactive", [("interactive", 60.0, None)]) == 60.0

@@ -7,14 +7,12 @@ import pytest
 import sqlalchemy as sa
 from harness import database_of, eventually, finished, running, url_of
 
-from app.jobs.capacity import QueueLimit
 from app.jobs.errors import JobNotFound, failure
 from app.jobs.model import Idempotency, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import JobStore
 from app.jobs.tables import artifacts, idempotency_keys, jobs
 
 KIND = JobKind("solve", "nowhere:solve", "interactive", dropped_fields=frozenset({"weights"}))
-ROOM = QueueLimit(100, 1.0)
 DAY_S = 86_400.0
 
 
@@ -34,8 +32,8 @@ def store(database):
 
 def add(store, key=None, **payload):
     idempotency = None if key is None else Idempotency("client", key, "hash")
-    claim, _ = store.insert(KIND, payload, run_now=True, limit=ROOM, idempotency=idempotency)
-    return claim.job
+    job, _ = store.insert(KIND, payload, run_now=True, places=100, idempotency=idempotency)
+    return job
 
 
 def succeed(store, job):

@@ -327,6 +327,7 @@ def test_a_result_that_could_not_be_stored_for_long_costs_an_attempt_and_not_the
     monkeypatch.setattr(attempts, "_FIRST_PAUSE_S", 0.0)
     monkeypatch.setattr(maintenance, "_SAVE_INTERVAL_S", 0.01)
     monkeypatch.setattr(maintenance, "_LOOK_INTERVAL_S", 0.01)
+    monkeypatch.setattr(maintenance, "_AGAIN_S", 0.01)
 
     async def scenario():
         gate = tmp_path / "gate"

@@ -17,7 +17,6 @@ from harness import (
 )
 from structlog.contextvars import bound_contextvars
 
-from app.jobs.capacity import QueueLimit
 from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull
 from app.jobs.local import LocalExecutor
@@ -109,10 +108,10 @@ def test_of_those_who_take_a_job_out_of_its_turn_at_once_one_gets_it(shared_url)
     hasty = JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:note")
     with ThreadPoolExecutor(2) as threads:
         for _ in range(50):
-            taken_in, _ = stores[0].insert(hasty, {}, run_now=False, limit=QueueLimit(100, 1.0))
-            claims = threads.map(lambda store, job_id=taken_in.job.id: store.claim_these([job_id]), stores)
+            taken_in, _ = stores[0].insert(hasty, {}, run_now=False, places=100)
+            claims = threads.map(lambda store, job_id=taken_in.id: store.claim_these([job_id]), stores)
             [claim] = [claim for taken in claims for claim in taken]
-            assert (claim.job.id, claim.job.attempt) == (taken_in.job.id, 1)
+            assert (claim.id, claim.attempt) == (taken_in.id, 1)
     for store in stores:
         store.database.dispose()
 
@@ -182,14 +181,14 @@ def test_times_are_those_of_the_database_whatever_a_machine_thinks(shared_url):
     right = JobStore(database, "right", 3, KINDS)
     astray.migrate()
     before = time.time() - 60.0
-    taken_in, _ = astray.insert(KINDS[0], {}, run_now=False, limit=QueueLimit(9, 1.0), time_limit_s=hours)
-    assert before < taken_in.job.created_at.timestamp() < time.time() + 60.0
+    taken_in, _ = astray.insert(KINDS[0], {}, run_now=False, places=9, time_limit_s=hours)
+    assert before < taken_in.created_at.timestamp() < time.time() + 60.0
     for store in (astray, right):
         [deadline] = store.deadlines([KINDS[0].name]).values()
         assert hours - 60.0 < deadline - store.clock.now() <= hours
     claim = astray.claim(["interactive"])
     assert hours - 60.0 < claim.deadline - astray.clock.now() <= hours
-    done = right.succeed(claim.job.id, 1, WorkResult({}), Progress())
+    done = right.succeed(claim.id, 1, WorkResult({}), Progress())
     assert before < done.created_at.timestamp() <= done.started_at.timestamp()
     assert done.started_at <= done.finished_at
     assert done.finished_at.timestamp() < time.time() + 60.0

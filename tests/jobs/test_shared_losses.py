@@ -25,9 +25,8 @@ from harness import (
 from postgresql_server import PostgresqlServer
 from sqlalchemy.exc import OperationalError
 
-from app.jobs.capacity import QueueLimit
 from app.jobs.model import Idempotency, JobKind, JobStatus
-from app.jobs.peers import PostgresPeers
+from app.jobs.peers import Peers
 from app.jobs.store import JobStore
 
 HERE = Path(__file__).parent
@@ -115,8 +114,9 @@ def test_a_restart_of_the_database_loses_nothing(how, tmp_path):
 def test_nobody_is_judged_before_all_had_the_time_to_show_themselves(shared_url):
     now = [1000.0]
     database = database_of(shared_url)
-    JobStore(database, "a", 3).migrate()
-    judge, other = (PostgresPeers(database, name, 10.0, clock=lambda: now[0]) for name in ("judge", "other"))
+    stores = [JobStore(database, name, 3) for name in ("judge", "other")]
+    stores[0].migrate()
+    judge, other = (Peers(store, 10.0, clock=lambda: now[0]) for store in stores)
 
     def pass_time(seconds):
         now[0] += seconds
@@ -156,10 +156,8 @@ def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(shared_ur
             # As if the commit of a job that begins as running had been made and its confirmation lost.
             store = service._store
             kind = next(kind for kind in KINDS if kind.name == "echo")
-            claim, _ = await asyncio.to_thread(
-                store.insert, kind, {"n": 1}, run_now=True, limit=QueueLimit(1, 1.0)
-            )
-            done = await finished(service, claim.job)
+            claim, _ = await asyncio.to_thread(store.insert, kind, {"n": 1}, run_now=True, places=1)
+            done = await finished(service, claim)
             assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
 
     asyncio.run(scenario())

@@ -13,14 +13,12 @@ from harness import database_of, url_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.jobs.capacity import QueueLimit
 from app.jobs.errors import InvalidCursor, failure
 from app.jobs.model import Job, JobKind, JobStatus, Progress, WorkResult
 from app.jobs.store import VERSION_TABLE, JobStore
 from app.jobs.tables import metadata
 
 KIND = JobKind("solve", "nowhere:solve", "interactive")
-ROOM = QueueLimit(100, 1.0)
 SOME = Progress(0.5, best_reward=1.5)
 
 
@@ -39,8 +37,8 @@ def store(database):
 
 
 def add(store: JobStore, **options: Any) -> Job:
-    claim, _ = store.insert(KIND, {}, **{"run_now": False, "limit": ROOM, **options})
-    return claim.job
+    job, _ = store.insert(KIND, {}, **{"run_now": False, "places": 100, **options})
+    return job
 
 
 def test_the_migrations_make_the_tables_that_the_code_uses(store, database):
@@ -62,11 +60,11 @@ def test_a_late_result_of_a_lost_attempt_is_dropped(database):
     store.migrate()
     job = add(store)
 
-    assert store.claim(["interactive"]).job.attempt == 1
+    assert store.claim(["interactive"]).attempt == 1
     assert store.mark_crashed(job.id, 1, "its worker died", SOME).status is JobStatus.QUEUED
     late = WorkResult({"late": True}, b"late")
     assert store.succeed(job.id, 1, late, SOME) is None
-    assert store.claim(["interactive"]).job.attempt == 2
+    assert store.claim(["interactive"]).attempt == 2
     assert store.succeed(job.id, 1, late, SOME) is None
     assert store.fail(job.id, 1, failure("x", "y"), SOME) is None
     assert store.mark_crashed(job.id, 1, "", SOME) is None
@@ -85,10 +83,10 @@ def test_a_late_result_of_a_lost_attempt_is_dropped(database):
 def test_the_queue_is_first_in_first_out_and_a_lost_job_keeps_its_place(store):
     first, second, third = (add(store) for _ in range(3))
     assert store.claim(["training"]) is None
-    assert store.claim(["interactive"]).job.id == first.id
-    assert store.claim(["interactive"]).job.id == second.id
+    assert store.claim(["interactive"]).id == first.id
+    assert store.claim(["interactive"]).id == second.id
     store.mark_crashed(first.id, 1, "its worker died", SOME)
-    assert [store.claim(["interactive"]).job.id for _ in range(2)] == [first.id, third.id]
+    assert [store.claim(["interactive"]).id for _ in range(2)] == [first.id, third.id]
     assert store.claim(["interactive"]) is None
 
 
@@ -119,7 +117,7 @@ def test_the_next_start_gives_back_what_dead_owners_ran(store, database):
     assert after.get(mine[0].id).progress == SOME
     assert store.succeed(mine[0].id, 1, WorkResult({}), SOME) is None
     # A second loss is the last of two attempts.
-    assert after.claim(["interactive"]).job.id == mine[0].id
+    assert after.claim(["interactive"]).id == mine[0].id
     assert [job.status for job in after.recover(lambda owner: False)] == [JobStatus.FAILED]
     assert after.get(mine[0].id).error["code"] == "worker-lost"
     # A version without this kind of job can only fail what waits for it.
