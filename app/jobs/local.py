@@ -156,9 +156,8 @@ class _Worker:
             if self._doomed:
                 self.kill()
             self._call(self._started.set_result, None)
-            with contextlib.suppress(
-                Exception
-            ):  # one that sends what cannot be read is no better than a dead one
+            # One that sends what cannot be read is no better than a dead one.
+            with contextlib.suppress(Exception):
                 while True:
                     self._call(self._hear, self._pipe.recv())
             self._process.kill()
