@@ -52,3 +52,8 @@ def searched(folder, kind, count, moves):
 @lru_cache
 def read(path):
     return read_demonstrations(path)
+
+
+def of_greedy_rule(tried):
+    """(problems,) reward of the greedy rule, over that of the searched plan."""
+    return np.array([reward_of(each.problem, greedy_plan(each.problem)) / each.reward for each in tried])

@@ -5,8 +5,8 @@
 One size, 7 x 15 with K = 3. Every variant is trained from random weights for ``--minutes`` of processor time
 (one thread), with as many demonstrations and the same schedule over that time. Then it plays fresh problems
 of all families, and of none, greedily, once each. Printed is the mean of reward over that of a search of
-400,000 moves, ± the standard deviation over seeds, and by how much it is more than the full learner's, ± the
-standard error over problems. Where staying at home earns more, that counts.
+400,000 moves, ± the standard deviation over seeds, and in brackets by how much it is more than the full
+learner's, ± the standard error over problems. Where staying at home earns more, that counts.
 
 - full: as ``python -m app train-universal`` learns, but of families alone and without corrections;
 - order: UAVs act in the order of their numbers, in play and in the states that are learned from; otherwise
@@ -63,6 +63,7 @@ from ablation_problems import (  # noqa: E402
     K,
     M,
     N,
+    of_greedy_rule,
     problems_of,
     read,
     searched,
@@ -83,8 +84,6 @@ from app.learning.universal.training.corrections import correct  # noqa: E402
 from app.learning.universal.training.trainer import Material, Schedule  # noqa: E402
 from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
 from app.simulation.arrays import compile_problem  # noqa: E402
-from app.simulation.evaluation import reward_of  # noqa: E402
-from app.solvers.greedy import greedy_plan  # noqa: E402
 
 LR, MUON_LR, TD_WEIGHT, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 4, 30
 EPISODES = 24
@@ -344,12 +343,20 @@ def main():
 def table(done, options, seconds):
     """Lines of Markdown, of what is finished."""
     seeds = range(1, options.seeds + 1)
+    tried = {kind: read(searched(options.work, kind, TRIED, LONG)) for kind in TRIED_KINDS}
+    reloads = np.array([each.problem.n_bases > 0 for each in tried["none"]])
+    columns = {
+        "families": ("families", np.ones(TRIED, np.bool_)),
+        "none": ("none", np.ones(TRIED, np.bool_)),
+        f"the {reloads.sum()} of them with bases": ("none", reloads),
+        "without": ("none", ~reloads),
+    }
     lines = [
         f"{platform.machine()}, torch {torch.__version__}, one thread: {options.minutes:g} min of processor "
         f"time each, {options.seeds} seeds, {LEARNED} demonstrations, {TRIED} fresh problems, {M} x {N}",
         "",
-        "| variant | families | more than full | none | more than full | updates |",
-        "| --- | --- | --- | --- | --- | --- |",
+        f"| variant | {' | '.join(columns)} | updates |",
+        f"| --- | {'--- | ' * len(columns)}--- |",
     ]
 
     def ratios(name, way, kind):
@@ -358,14 +365,14 @@ def table(done, options, seconds):
 
     def row(title, name, way):
         cells = [title]
-        for kind in TRIED_KINDS:
+        for kind, which in columns.values():
             if kind not in done[name, seeds[0], seconds][way]:
-                cells += ["–", ""]
+                cells.append("–")
                 continue
-            mine = ratios(name, way, kind)
-            means, more = mine.mean(axis=1), (mine - ratios("full", "surest", kind)).mean(axis=0)
-            cells.append(f"{means.mean():.3f} ± {means.std():.3f}")
-            cells.append(f"{more.mean():+.3f} ± {more.std() / len(more) ** 0.5:.3f}" if more.any() else "")
+            mine, full = ratios(name, way, kind)[:, which], ratios("full", "surest", kind)[:, which]
+            means, more = mine.mean(axis=1), (mine - full).mean(axis=0)
+            against = f" ({more.mean():+.3f} ± {more.std() / len(more) ** 0.5:.3f})" if more.any() else ""
+            cells.append(f"{means.mean():.3f} ± {means.std():.3f}{against}")
         cells.append(f"{np.mean([done[name, seed, seconds]['updates'] for seed in seeds]):.0f}")
         lines.append(f"| {' | '.join(cells)} |")
 
@@ -377,12 +384,9 @@ def table(done, options, seconds):
             row("full, played in order", name, "order")
         if name == "order":
             row("order, played by the surest", name, "surest")
-    rule = []
-    for kind in TRIED_KINDS:
-        tried = read(searched(options.work, kind, TRIED, LONG))
-        earned = [reward_of(each.problem, greedy_plan(each.problem)) / each.reward for each in tried]
-        rule.append(f"{np.mean(earned):.3f}")
-    lines.append(f"| greedy rule | {' | | '.join(rule)} | | |")
+    rule = {kind: of_greedy_rule(tried[kind]) for kind in tried}
+    cells = (f"{rule[kind][which].mean():.3f}" for kind, which in columns.values())
+    lines.append(f"| greedy rule | {' | '.join(cells)} | |")
     return lines
 
 
