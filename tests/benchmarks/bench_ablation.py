@@ -1,25 +1,34 @@
-"""What each part of the learner is worth: variants trained for the same time from the same demonstrations.
+"""What each part of the learner is worth: variants trained for the same time.
 
-    python tests/benchmarks/bench_ablation.py --work FOLDER [--minutes 1] [--seeds 3] [--workers 2]
+    python tests/benchmarks/bench_ablation.py --work FOLDER [--minutes 1] [--seeds 3] [--variants full VDN]
 
-One size, 7 x 15 with K = 3, all families. Every variant is trained from random weights for ``--minutes`` of
-processor time (one thread), with the same demonstrations and the same schedule over that time, then plays
-fresh problems greedily, once each. Printed is the mean of reward over that of a search of 400,000 moves, ±
-the standard deviation over seeds.
+One size, 7 x 15 with K = 3. Every variant is trained from random weights for ``--minutes`` of processor time
+(one thread), with as many demonstrations and the same schedule over that time. Then it plays fresh problems
+of all families, and of none, greedily, once each. Printed is the mean of reward over that of a search of
+400,000 moves, ± the standard deviation over seeds, and in brackets by how much it is more than the full
+learner's, ± the standard error over problems. Where staying at home earns more, that counts.
 
-- full: as ``python -m app train-universal`` learns, without corrections;
+- full: as ``python -m app train-universal`` learns, but of families alone and without corrections;
+- order: UAVs act in the order of their numbers, in play and in the states that are learned from; otherwise
+  the surest acts. Both are also played the other way;
+- uniform alone, drawn alone: demonstrations of one family, and of the generator of problems of no family;
+- half drawn: half of the demonstrations of each of both;
 - corrections: from half of the time on also from 512 of them, which it makes then, off the clock;
-- Adam: in place of Muon on the matrices, at the learning rate that suits it;
+- VDN: Q_tot is the sum of the agents' values;
 - no TD loss: cross-entropy alone;
 - no demonstrations: own sampled episodes and the TD loss alone;
-- VDN: Q_tot is the sum of the agents' values;
 - no bias: neither distances nor what is seen of a UAV and a place together count in the attention;
 - no pooling: what is seen of a UAV and a place together counts in no token;
+- Adam: in place of Muon on the matrices, at the learning rate that suits it;
+- short search: plans of the demonstrations are searched with a tenth of the moves;
 - paper: agent and mixing network of the paper for this one size, by the paper's observations, on the same
-  demonstrations with the same two losses, target network copied every 100 updates.
+  demonstrations with the same two losses, target network copied every 100 updates. It takes no bases, so it
+  plays families alone.
+
+There is none without recurrence: the network has none.
 
 Demonstrations and finished runs stay in the work folder, so a stopped benchmark goes on where it was; the
-table is written to ``ablation.md`` there.
+table of what is finished is written to ``ablation.md`` there.
 """
 
 from __future__ import annotations
@@ -33,8 +42,8 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import torch
@@ -43,6 +52,24 @@ from torch.nn import functional
 
 sys.path[:0] = [str(Path(__file__).parents[2])]
 
+from ablation_problems import (  # noqa: E402
+    CORRECTED,
+    LEARNED,
+    LONG,
+    MOVES,
+    SHORT,
+    TRIED,
+    TRIED_KINDS,
+    K,
+    M,
+    N,
+    of_greedy_rule,
+    problems_of,
+    read,
+    searched,
+)
+
+from app.learning.pairwise import rollout  # noqa: E402
 from app.learning.pairwise.architecture import PairwiseConfig  # noqa: E402
 from app.learning.pairwise.learner import Learner, make_decisions  # noqa: E402
 from app.learning.pairwise.policy import PairwisePolicy  # noqa: E402
@@ -54,21 +81,10 @@ from app.learning.paper.learner import Learner as PaperLearner  # noqa: E402
 from app.learning.paper.networks import QmixNetwork  # noqa: E402
 from app.learning.paper.replay_buffer import Batch as PaperBatch  # noqa: E402
 from app.learning.universal.training.corrections import correct  # noqa: E402
-from app.learning.universal.training.demonstrations import (  # noqa: E402
-    demonstrate,
-    read_demonstrations,
-    write_demonstrations,
-)
 from app.learning.universal.training.trainer import Material, Schedule  # noqa: E402
 from app.learning.universal.updates.optimiser import adam, muon  # noqa: E402
 from app.simulation.arrays import compile_problem  # noqa: E402
-from app.simulation.evaluation import reward_of  # noqa: E402
-from app.simulation.generator import FAMILIES, generate  # noqa: E402
-from app.solvers.greedy import greedy_plan  # noqa: E402
 
-M, N, K = 7, 15, 3
-LEARNED, TRIED, CORRECTED = 1024, 64, 512
-MOVES = {LEARNED: 60_000, TRIED: 400_000}
 LR, MUON_LR, TD_WEIGHT, TD_EVERY, WARM_UP = 2e-3, 1e-2, 0.2, 4, 30
 EPISODES = 24
 """Own episodes, and the paper's, in an update."""
@@ -88,6 +104,9 @@ class Sum(nn.Module):
 class Variant:
     """What differs from the full learner; parts of the agent by name are 0 and stay so."""
 
+    kinds: tuple[str, ...] = ("families",)
+    moves: int = MOVES
+    in_order: bool = False
     corrections: bool = False
     demonstrations: bool = True
     td_weight: float = TD_WEIGHT
@@ -98,35 +117,39 @@ class Variant:
 
 VARIANTS = {
     "full": Variant(),
+    "order": Variant(in_order=True),
+    "uniform alone": Variant(kinds=("uniform",)),
+    "drawn alone": Variant(kinds=("none",)),
+    "half drawn": Variant(kinds=("families", "none")),
     "corrections": Variant(corrections=True),
-    "Adam": Variant(muon=False),
+    "VDN": Variant(mixer=False),
     "no TD loss": Variant(td_weight=0.0),
     "no demonstrations": Variant(demonstrations=False),
-    "VDN": Variant(mixer=False),
     "no bias": Variant(without=("visit_bias", "reload_bias", "distance_bias")),
     "no pooling": Variant(without=("uav_pool", "area_pool", "base_pool")),
+    "Adam": Variant(muon=False),
+    "short search": Variant(moves=SHORT),
 }
 PAPER = "paper"
 
 
-def problems_of(count):
-    """Problems of which the greedy rule earns something; another number of them is others."""
-    rng, found = np.random.default_rng([60_000_011, count]), []
-    families = list(FAMILIES)
-    while len(found) < count:
-        problem = generate(families[len(found) % len(families)], M, N, K, rng)
-        if reward_of(problem, greedy_plan(problem)) > 0.05 * max(t.level for t in problem.targets):
-            found.append(problem)
-    return found
+class InOrder(np.random.Generator):
+    """Draws no order of UAVs: those with the lowest numbers have acted."""
+
+    def permuted(self, x, **_):
+        return x
 
 
-def searched(folder, count):
-    """Write a plan for each problem, unless the file is there; return where."""
-    path = folder / f"demonstrations-{count}.jsonl"
-    if not path.exists():
-        rng = np.random.default_rng(count)
-        write_demonstrations(path, [demonstrate(each, MOVES[count], rng) for each in problems_of(count)])
-    return path
+class OrderedMaterial(Material):
+    """Demonstrations whose UAVs act in the order of their numbers."""
+
+    def batch(self, rng):
+        return super().batch(InOrder(rng.bit_generator))
+
+
+def by_number(_logits, choice):
+    """Let the lower number be the surer."""
+    return np.tile(-np.arange(choice.shape[1], dtype=np.float64), (len(choice), 1))
 
 
 class Clock:
@@ -161,7 +184,11 @@ def train(name, seed, seconds, shown):
     lr, optimisers = (MUON_LR, muon) if variant.muon else (LR, adam)
     mixer = policy.mixer if variant.mixer else Sum()
     learner = Learner(policy.agent, mixer, lr=lr, td_weight=variant.td_weight, optimisers=optimisers)
-    schedule, material = Schedule(1, td_weight=variant.td_weight, seed=seed), Material(shown, CPU)
+    schedule = Schedule(1, td_weight=variant.td_weight, seed=seed)
+    material = (OrderedMaterial if variant.in_order else Material)(shown, CPU)
+    # What is compiled or loaded at a first call is not the training's.
+    material.of_update(schedule, TD_EVERY - 1)
+    own_episodes(policy, shown, np.random.default_rng(seed))
     clock, corrected = Clock(seconds), not variant.corrections
     while clock.share < 1:
         if clock.share > 0.5 and not corrected:
@@ -180,7 +207,7 @@ def train(name, seed, seconds, shown):
 def corrections_of(policy, seed):
     """Let a policy play fresh problems, and search what it should have done."""
     rng = np.random.default_rng([seed, CORRECTED])
-    found = (correct(each, policy, MOVES[LEARNED], rng) for each in problems_of(CORRECTED))
+    found = (correct(each, policy, MOVES, rng) for each in problems_of("families", CORRECTED))
     return [each for each in found if each is not None]
 
 
@@ -246,25 +273,34 @@ def paper_episodes(shown):
     return PaperBatch(*map(torch.from_numpy, (states, allowed, actions, rewards, terminated, filled)))
 
 
-@lru_cache(maxsize=2)
-def read(path):
-    return read_demonstrations(path)
+def played(play, tried):
+    """Reward of each problem, over what the long search earns."""
+    return [round(float(play(each.problem)) / each.reward, 5) for each in tried]
 
 
 def run(name, seed, seconds, folder):
-    """Greedy ratio of a variant on the problems that are tried, its spread over them, and its updates."""
+    """Greedy ratios of a variant on the problems that are tried, by who acts first, and its updates."""
     torch.set_num_threads(1)
-    shown, tried = (read(searched(folder, count)) for count in (LEARNED, TRIED))
+    variant = VARIANTS.get(name, Variant())
+    files = [searched(folder, kind, LEARNED, variant.moves) for kind in variant.kinds]
+    shown = [each for file in files for each in read(file)[: LEARNED // len(files)]]
+    tried = {kind: read(searched(folder, kind, TRIED, LONG)) for kind in TRIED_KINDS}
     if name == PAPER:
         network, updates = train_paper(seed, seconds, shown)
-        rewards = [Actor(SwarmEnvironment(each.problem), network).play_greedily().reward for each in tried]
-    else:
-        policy, updates = train(name, seed, seconds, shown)
-        rewards = [
-            policy.play(compile_problem(each.problem), np.zeros(1, np.int64)).rewards[0] for each in tried
-        ]
-    ratios = np.array(rewards) / [each.reward for each in tried]
-    return {"ratio": float(ratios.mean()), "spread": float(ratios.std()), "updates": updates}
+
+        def of_paper(problem):
+            return Actor(SwarmEnvironment(problem), network).play_greedily().reward
+
+        return {"order": {"families": played(of_paper, tried["families"])}, "updates": updates}
+    policy, updates = train(name, seed, seconds, shown)
+
+    def of_policy(problem):
+        return policy.play(compile_problem(problem), np.zeros(1, np.int64)).rewards[0]
+
+    surest = {kind: played(of_policy, tried[kind]) for kind in tried}
+    with patch.object(rollout, "_log_probability", by_number):
+        order = {kind: played(of_policy, tried[kind]) for kind in tried}
+    return {"surest": surest, "order": order, "updates": updates}
 
 
 def main():
@@ -274,15 +310,20 @@ def main():
     parser.add_argument("--minutes", type=float, default=1.0, help="of processor time a training")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--variants", nargs="+", default=[*VARIANTS, PAPER], choices=[*VARIANTS, PAPER])
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    for count in (LEARNED, TRIED):
-        searched(options.work, count)
+    for kind in TRIED_KINDS:
+        searched(options.work, kind, TRIED, LONG)
+    for name in options.variants:
+        variant = VARIANTS.get(name, Variant())
+        for kind in variant.kinds:
+            searched(options.work, kind, LEARNED, variant.moves)
     file, done = options.work / "ablation.jsonl", {}
     if file.exists():
         done = {tuple(key): value for key, value in map(json.loads, file.read_text().splitlines())}
     seconds, seeds = 60 * options.minutes, range(1, options.seeds + 1)
-    asked = [(name, seed, seconds) for seed in seeds for name in (*VARIANTS, PAPER)]
+    asked = [(name, seed, seconds) for seed in seeds for name in options.variants]
     pool = ProcessPoolExecutor(options.workers, multiprocessing.get_context("spawn"))
     with pool, file.open("a", encoding="utf-8") as out:
         futures = {pool.submit(run, *key, options.work): key for key in asked if key not in done}
@@ -300,22 +341,52 @@ def main():
 
 
 def table(done, options, seconds):
-    """Lines of Markdown."""
-    tried = read(searched(options.work, TRIED))
-    rule = np.array([reward_of(each.problem, greedy_plan(each.problem)) / each.reward for each in tried])
+    """Lines of Markdown, of what is finished."""
+    seeds = range(1, options.seeds + 1)
+    tried = {kind: read(searched(options.work, kind, TRIED, LONG)) for kind in TRIED_KINDS}
+    reloads = np.array([each.problem.n_bases > 0 for each in tried["none"]])
+    columns = {
+        "families": ("families", np.ones(TRIED, np.bool_)),
+        "none": ("none", np.ones(TRIED, np.bool_)),
+        f"the {reloads.sum()} of them with bases": ("none", reloads),
+        "without": ("none", ~reloads),
+    }
     lines = [
         f"{platform.machine()}, torch {torch.__version__}, one thread: {options.minutes:g} min of processor "
-        f"time each, {options.seeds} seeds, {LEARNED} demonstrations, {TRIED} fresh problems of {M} x {N}",
+        f"time each, {options.seeds} seeds, {LEARNED} demonstrations, {TRIED} fresh problems, {M} x {N}",
         "",
-        "| variant | greedy ratio | updates |",
-        "| --- | --- | --- |",
+        f"| variant | {' | '.join(columns)} | updates |",
+        f"| --- | {'--- | ' * len(columns)}--- |",
     ]
+
+    def ratios(name, way, kind):
+        """(seeds, problems)"""
+        return np.maximum([done[name, seed, seconds][way][kind] for seed in seeds], 0.0)
+
+    def row(title, name, way):
+        cells = [title]
+        for kind, which in columns.values():
+            if kind not in done[name, seeds[0], seconds][way]:
+                cells.append("–")
+                continue
+            mine, full = ratios(name, way, kind)[:, which], ratios("full", "surest", kind)[:, which]
+            means, more = mine.mean(axis=1), (mine - full).mean(axis=0)
+            against = f" ({more.mean():+.3f} ± {more.std() / len(more) ** 0.5:.3f})" if more.any() else ""
+            cells.append(f"{means.mean():.3f} ± {means.std():.3f}{against}")
+        cells.append(f"{np.mean([done[name, seed, seconds]['updates'] for seed in seeds]):.0f}")
+        lines.append(f"| {' | '.join(cells)} |")
+
     for name in (*VARIANTS, PAPER):
-        runs = [done[name, seed, seconds] for seed in range(1, options.seeds + 1)]
-        ratios = np.array([each["ratio"] for each in runs])
-        updates = np.mean([each["updates"] for each in runs])
-        lines.append(f"| {name} | {ratios.mean():.3f} ± {ratios.std():.3f} | {updates:.0f} |")
-    lines.append(f"| greedy rule | {rule.mean():.3f} | |")
+        if any((each, seed, seconds) not in done for each in ("full", name) for seed in seeds):
+            continue
+        row(name, name, "order" if name in {"order", PAPER} else "surest")
+        if name == "full":
+            row("full, played in order", name, "order")
+        if name == "order":
+            row("order, played by the surest", name, "surest")
+    rule = {kind: of_greedy_rule(tried[kind]) for kind in tried}
+    cells = (f"{rule[kind][which].mean():.3f}" for kind, which in columns.values())
+    lines.append(f"| greedy rule | {' | '.join(cells)} | |")
     return lines
 
 
