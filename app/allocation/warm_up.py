@@ -301,6 +301,13 @@ def _combining() -> None:
     solver.solve(problem, 0, never, lambda _progress: None)
 
 
+def _sharing() -> None:
+    """Let threads share a plan, which has to have UAVs enough."""
+    parameters = parse_parameters("local_search", {"moves": 400, "restarts": 0})
+    solver = create_solver("local_search", parameters, protocol.SolverContext(threads=2))
+    solver.solve(_large_problem(40, 80), 0, never, lambda _progress: None)
+
+
 def _evaluation() -> None:
     """Evaluate a plan of nothing, which has reasons, and one that breaks a rule."""
     problem = _small_problem()
@@ -385,6 +392,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     "rest of transfer": partial(_named, _TRANSFER_REST),
     "reloads": _reloads,
     "combining": _combining,
+    "sharing": _sharing,
     "bound": _bound,
     "geography": _geography,
     "evaluation": _evaluation,

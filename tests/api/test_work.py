@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from referee import replay
 
@@ -24,6 +25,7 @@ from app.learning.pairwise.policy import PairwisePolicy
 from app.learning.parameters import QmixParameters
 from app.library.entries import new_policy
 from app.settings import Settings
+from app.simulation.generator import generate
 from policy_store.database import Database
 from policy_store.library import PolicyLibrary
 
@@ -205,7 +207,10 @@ from app.jobs.work_context import WorkContext
 
 def compiled():
     found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
-    return {f"{each.py_func.__module__}.{each.py_func.__name__}": len(each.overloads) for each in found}
+    return {
+        f"{type(each).__name__} {each.py_func.__module__}.{each.py_func.__name__}": len(each.overloads)
+        for each in found
+    }
 
 warm_up()
 before = compiled()
@@ -241,6 +246,8 @@ print(json.dumps([before, compiled(), loaded]))
     plenty = [replace(uav, loadlist=tuple(1000.0 for _ in uav.loadlist)) for uav in problem.uavs]
     combined = Problem(tuple(plenty), problem.targets)
     payloads.append(payload("local_search", {"moves": 60_000, "restarts": 2}, problem_to_record(combined)))
+    large = problem_to_record(generate("uniform", 40, 80, 3, np.random.default_rng(1)))
+    payloads.append(payload("local_search", {"moves": 1000}, large) | {"threads": 2})
     for each in payloads:
         each["library_url"] = library_url
 
