@@ -291,6 +291,24 @@ def _reloads() -> None:
     objective = replace(problem.objective, unloading="planned", loading="planned")
     for each in (refilled, replace(refilled, objective=objective)):
         tasks.allocate(_request(each, "greedy", {}), _unlimited())
+    for algorithm in ("local_search", "exact"):
+        tasks.allocate(_request(refilled, algorithm, _PARAMETERS[algorithm]), _unlimited())
+    # What could be brought besides is not worth the way.
+    dear = replace(refilled, objective=replace(objective, distance_weight=100.0))
+    tasks.allocate(_request(dear, "greedy", {}), _unlimited())
+
+
+def _promises() -> None:
+    """Find reasons where an area is promised, nobody may fly to another one, and the end costs reward."""
+    problem = _small_problem()
+    (carrier, other), (*rest, last) = problem.uavs, problem.targets
+    problem = replace(
+        problem,
+        uavs=(replace(carrier, committed=("area-1",)), other),
+        targets=(*rest, replace(last, skills=("winch",))),
+        objective=replace(problem.objective, makespan_weight=0.1),
+    )
+    tasks.allocate(_request(problem, "local_search", _PARAMETERS["local_search"]), _unlimited())
 
 
 def _combining() -> None:
@@ -391,6 +409,7 @@ _PARTS: dict[str, Callable[[], None]] = {
     **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
     "rest of transfer": partial(_named, _TRANSFER_REST),
     "reloads": _reloads,
+    "promises": _promises,
     "combining": _combining,
     "sharing": _sharing,
     "bound": _bound,
