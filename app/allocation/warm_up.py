@@ -7,35 +7,34 @@ import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from multiprocessing.connection import wait
-from typing import Any
 
-import numpy as np
-
-from app.allocation import bounding, evaluating, tasks
+from app.allocation import bounding, tasks
 from app.allocation.answer_time import BOUND
-from app.domain.errors import IllegalPlan, NoCompatibleSource
-from app.domain.problem import UAV, Problem, Target
-from app.domain.records import problem_to_record
-from app.domain.surroundings import Base
-from app.jobs.model import Progress
-from app.jobs.work_context import WorkContext
+from app.allocation.warm_up_parts import (
+    DEFAULT,
+    OTHERS,
+    PARTS,
+    geography,
+    large_problem,
+    planned_reasons,
+    request_for,
+    small_problem,
+    unlimited,
+    unloading,
+)
+from app.domain.errors import NoCompatibleSource
+from app.domain.problem import Problem
 from app.jobs.worker import resolve
-from app.simulation.arrays import compile_problem
 from app.simulation.compilation import compile_in_turns, compiled_here, first_at
-from app.simulation.generator import generate
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
-from app.solvers.stop import Deadline, never
+from app.solvers.stop import Deadline
 
 # The learners are named, not imported, so that this room does not depend on them.
-_TRANSFER = "app.learning.universal.request.warm_up:warm_up"
-_TRANSFER_REST = "app.learning.universal.request.warm_up:warm_up_the_rest"
 _PRELOAD = "app.learning.checkpoints.source_policies:preload"
 
 _LARGEST_TRIED = (1000, 2000)
@@ -59,36 +58,6 @@ _ANSWERS_TIMED = 3
 
 _COMPILING_LEAVES = 5
 """Niceness of what compiles while jobs may run: as much as the workers have."""
-
-_PARAMETERS: dict[str, dict[str, Any]] = {
-    "greedy": {},
-    "local_search": {"moves": 200},
-    "dqn": {"n_epochs": 4, "evaluate_per_epoch": 2, "buffer_size": 2, "batch_size": 2, "learning_starts": 1},
-    "exact": {"nodes": 10},
-    "ga": {"num_total": 4, "iteration": 2},
-    # In service mode nothing that the transfer's warm-up leaves out.
-    "qmix": {
-        "mode": "paper",
-        "n_epochs": 4,
-        "evaluate_per_epoch": 2,
-        "buffer_size": 2,
-        "batch_size": 2,
-        "learning_starts": 1,
-    },
-    "auto": {"moves": 200, "policy": False},
-    **{
-        name: {"evaluations": 50}
-        for name in (
-            "particle_swarm",
-            "grey_wolf",
-            "beetle_antennae",
-            "ant_colony",
-            "contract_net",
-            "bundles",
-            "semi_random_q",
-        )
-    },
-}
 
 
 def warm_up(most_uavs: int = 50, most_targets: int = 100, library_url: str | None = None) -> None:
@@ -132,23 +101,23 @@ def warm_up_worker(
 
 def load_all() -> None:
     """Load all compiled code, and nothing for a size of problem."""
-    for part in _PARTS.values():
+    for part in PARTS.values():
         part()
 
 
 def _prepare_default(most_uavs: int, most_targets: int, library_url: str | None) -> None:
-    _load(_DEFAULT)
+    _load(DEFAULT)
     if library_url is not None:
-        resolve(_PRELOAD)(library_url, _small_problem())
+        resolve(_PRELOAD)(library_url, small_problem())
     _time_answers(most_uavs, most_targets)
     _time_algorithms(["transfer_qmix"], most_uavs, most_targets, library_url)
 
 
 def _prepare_others(most_uavs: int, most_targets: int, library_url: str | None) -> None:
-    _load(_OTHERS)
+    _load(OTHERS)
     others = [algorithm for algorithm in _TRIED if algorithm != "transfer_qmix"]
     _time_algorithms(others, most_uavs, most_targets, library_url)
-    _time_bound(_large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1])))
+    _time_bound(large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1])))
 
 
 def _prepare_others_later(most_uavs: int, most_targets: int, library_url: str | None) -> None:
@@ -163,7 +132,7 @@ def _compile_others() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.nice(_COMPILING_LEAVES)
     compile_in_turns()
-    _load(_OTHERS)
+    _load(OTHERS)
 
 
 def _end_with_parent() -> None:
@@ -179,11 +148,11 @@ def _load(parts: Sequence[str]) -> None:
     for part in parts:
         with first_at(part) as first:
             if first:
-                _PARTS[part]()
+                PARTS[part]()
             else:
                 put_off.append(part)
     for part in put_off:
-        _PARTS[part]()
+        PARTS[part]()
 
 
 def _time_algorithms(
@@ -192,7 +161,7 @@ def _time_algorithms(
     means = protocol.SolverContext(library_url)
     for algorithm in algorithms:
         for m, n in _TRIED[algorithm]:
-            _time_preparations(algorithm, _large_problem(min(most_uavs, m), min(most_targets, n)), means)
+            _time_preparations(algorithm, large_problem(min(most_uavs, m), min(most_targets, n)), means)
 
 
 def _time_bound(problem: Problem) -> None:
@@ -247,110 +216,25 @@ def compile_all(processes: int) -> None:
     """
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context, initializer=compile_in_turns) as pool:
-        list(pool.map(_do, (*_DEFAULT, *_OTHERS)))
+        list(pool.map(_do, (*DEFAULT, *OTHERS)))
     warm_up()
 
 
 def _do(part: str) -> None:
-    _PARTS[part]()
-
-
-def _algorithm(name: str) -> None:
-    problem = _small_problem()
-    found = tasks.allocate(_request(problem, name, _PARAMETERS[name]), _unlimited())
-    if found.artifact is not None:
-        tasks.verify(found.artifact, problem)
-
-
-def _named(warm_up_of: str) -> None:
-    resolve(warm_up_of)(_small_problem())
-
-
-def _bound() -> None:
-    bounding.warm_up(_small_problem())
-
-
-def _unloading() -> None:
-    problem = _small_problem()
-    planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    tasks.allocate_at_once(_request(planned, "greedy", {}), _unlimited())
-
-
-def _planned_reasons() -> None:
-    """Find reasons, and the amounts that go with them, where unloading is planned."""
-    problem = _small_problem()
-    planned = replace(problem, objective=replace(problem.objective, unloading="planned"))
-    tasks.allocate(_request(planned, "greedy", {}), _unlimited())
-
-
-def _reloads() -> None:
-    """Find reasons where there are bases; with planned loads, and with stocks that are refilled from."""
-    problem = _small_problem()
-    stocked = Base("base-1", 0.5, 0.5, stock=(1.0, 1.0))
-    refilled = replace(problem, bases=(stocked,))
-    objective = replace(problem.objective, unloading="planned", loading="planned")
-    for each in (refilled, replace(refilled, objective=objective)):
-        tasks.allocate(_request(each, "greedy", {}), _unlimited())
-    for algorithm in ("local_search", "exact"):
-        tasks.allocate(_request(refilled, algorithm, _PARAMETERS[algorithm]), _unlimited())
-    # What could be brought besides is not worth the way.
-    dear = replace(refilled, objective=replace(objective, distance_weight=100.0))
-    tasks.allocate(_request(dear, "greedy", {}), _unlimited())
-
-
-def _promises() -> None:
-    """Find reasons where an area is promised, nobody may fly to another one, and the end costs reward."""
-    problem = _small_problem()
-    (carrier, other), (*rest, last) = problem.uavs, problem.targets
-    problem = replace(
-        problem,
-        uavs=(replace(carrier, committed=("area-1",)), other),
-        targets=(*rest, replace(last, skills=("winch",))),
-        objective=replace(problem.objective, makespan_weight=0.1),
-    )
-    tasks.allocate(_request(problem, "local_search", _PARAMETERS["local_search"]), _unlimited())
-
-
-def _combining() -> None:
-    problem = _small_problem()
-    problem = replace(problem, uavs=tuple(replace(u, loadlist=(9.0, 9.0)) for u in problem.uavs))
-    parameters = parse_parameters("local_search", {"moves": 40_000, "restarts": 1})
-    solver = create_solver("local_search", parameters, protocol.SolverContext(threads=2))
-    solver.solve(problem, 0, never, lambda _progress: None)
-
-
-def _sharing() -> None:
-    """Let threads share a plan, which has to have UAVs enough."""
-    parameters = parse_parameters("local_search", {"moves": 400, "restarts": 0})
-    solver = create_solver("local_search", parameters, protocol.SolverContext(threads=2))
-    solver.solve(_large_problem(40, 80), 0, never, lambda _progress: None)
-
-
-def _evaluation() -> None:
-    """Evaluate a plan of nothing, which has reasons, and one that breaks a rule."""
-    problem = _small_problem()
-    problem = replace(problem, uavs=tuple(replace(uav, endurance=0.1) for uav in problem.uavs))
-    payload = {"problem": problem_to_record(problem), "at": 0.0}
-    evaluating.evaluate({**payload, "assignment": [[3, 3]]}, _unlimited())
-    with suppress(IllegalPlan):
-        evaluating.evaluate({**payload, "assignment": [[0, 3]]}, _unlimited())
-
-
-def _geography() -> None:
-    compile_problem(replace(_small_problem(), crs="wgs84"))
+    PARTS[part]()
 
 
 def warm_up_at_once(most_uavs: int = 50, most_targets: int = 100) -> None:
     """Load and compile what :func:`app.allocation.tasks.allocate_at_once` needs; see :func:`warm_up`."""
     compile_in_turns()
-    request = _request(_small_problem(), "greedy", {})
-    tasks.allocate_at_once({**request, "bound_time_limit_s": 1.0}, _unlimited())
-    _unloading()
-    _geography()
+    request = request_for(small_problem(), "greedy", {})
+    tasks.allocate_at_once({**request, "bound_time_limit_s": 1.0}, unlimited())
+    unloading()
+    geography()
     _time_answers(most_uavs, most_targets)
     if not compiled_here():
         # It completes answers too. Otherwise workers are about to compile this, and nobody waits for it here.
-        _planned_reasons()
+        planned_reasons()
 
 
 def _time_answers(most_uavs: int, most_targets: int) -> None:
@@ -359,67 +243,14 @@ def _time_answers(most_uavs: int, most_targets: int) -> None:
     The problem is a large one, so that the memory is there too that such a one takes: the system may need
     longer to find it than all the work takes that is done in it.
     """
-    largest = _large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1]))
+    largest = large_problem(min(most_uavs, _LARGEST_TRIED[0]), min(most_targets, _LARGEST_TRIED[1]))
     planned = replace(largest, objective=replace(largest.objective, unloading="planned"))
-    requests = [_request(problem, "greedy", {}) for problem in (largest, planned)]
+    requests = [request_for(problem, "greedy", {}) for problem in (largest, planned)]
     for request in requests:
-        tasks.allocate_at_once(request, _unlimited())
+        tasks.allocate_at_once(request, unlimited())
     tasks.answer_time.forget()
     for request in requests:
         for _ in range(_ANSWERS_TIMED):
-            tasks.allocate_at_once(request, _unlimited())
+            tasks.allocate_at_once(request, unlimited())
     # With the reasons too.
-    tasks.allocate(requests[0], _unlimited())
-
-
-def _small_problem() -> Problem:
-    # Floats throughout, as requests have them: an array of integers would be compiled for apart.
-    at, home = (1.0, 2.0), (0.0, 0.0)
-    return Problem(
-        uavs=tuple(UAV(f"uav-{i}", *home, *home, 1.0, 10.0, (2.0, 1.0)) for i in (1, 2)),
-        targets=tuple(Target(f"area-{j}", *at, 9.0, (1.0, 2.0), deadline=9.0) for j in (1, 2, 3)),
-        max_steps=2,
-    )
-
-
-def _large_problem(n_uavs: int, n_targets: int) -> Problem:
-    return generate("uniform", n_uavs, n_targets, 3, np.random.default_rng(0))
-
-
-def _request(problem: Problem, algorithm: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    record = problem_to_record(problem)
-    return {
-        "problem": record, "algorithm": algorithm, "parameters": parameters, "seed": 0, "library_url": None
-    }  # fmt: skip
-
-
-def _unlimited() -> WorkContext:
-    return WorkContext.in_process(_untold, time_limit_s=None)
-
-
-def _untold(_progress: Progress) -> None:
-    """Nobody waits for a warm-up's progress."""
-
-
-_PARTS: dict[str, Callable[[], None]] = {
-    "greedy": partial(_algorithm, "greedy"),
-    "transfer": partial(_named, _TRANSFER),
-    "planned unloading": _unloading,
-    "reasons of planned unloading": _planned_reasons,
-    **{name: partial(_algorithm, name) for name in _PARAMETERS if name != "greedy"},
-    "rest of transfer": partial(_named, _TRANSFER_REST),
-    "reloads": _reloads,
-    "promises": _promises,
-    "combining": _combining,
-    "sharing": _sharing,
-    "bound": _bound,
-    "geography": _geography,
-    "evaluation": _evaluation,
-}
-"""What together loads and compiles all there is."""
-
-_DEFAULT = ("transfer", "local_search", "greedy", "planned unloading", "geography")
-"""Parts that an answer of the default algorithm needs: what takes longest first, then what is
-a part of it and is compiled beside it."""
-
-_OTHERS = tuple(part for part in _PARTS if part not in _DEFAULT)
+    tasks.allocate(requests[0], unlimited())

@@ -93,9 +93,8 @@ class Peers:
         """Say nothing any more, and be forgotten, after the last job was settled or put back."""
         if self._announcements is not None:
             await asyncio.to_thread(self._announcements.close)
-            with contextlib.suppress(
-                Exception
-            ):  # a server that is gone: the others will see that this one is
+            # The server may be gone: the others will see that this one is.
+            with contextlib.suppress(Exception):
                 await writer.write(self.forget)
 
     def beat(self) -> dict[str, OwnedJob]:

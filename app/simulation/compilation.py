@@ -30,7 +30,7 @@ from numba.core import caching, sigutils
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 
-import app.simulation.callees  # noqa: F401
+import app.simulation.callees  # noqa: F401 - it changes how numba compiles
 
 __all__ = ["compile_in_turns", "compiled_here", "first_at", "njit", "source_stamp", "stamped_files"]
 

@@ -16,8 +16,8 @@ def done(monkeypatch):
     monkeypatch.setattr(
         warm_up, "_time_preparations", lambda algorithm, *_: steps.append(f"time {algorithm}")
     )
-    parts = {part: lambda part=part: steps.append(part) for part in warm_up._PARTS}
-    monkeypatch.setattr(warm_up, "_PARTS", parts)
+    parts = {part: lambda part=part: steps.append(part) for part in warm_up.PARTS}
+    monkeypatch.setattr(warm_up, "PARTS", parts)
     return steps
 
 
@@ -37,7 +37,7 @@ class Compiling:
 def test_a_worker_that_finds_code_compiled_loads_everything_first(done, monkeypatch):
     monkeypatch.setattr(warm_up, "compiled_here", lambda: 0)
     assert warm_up.warm_up_worker(5, 5) is None
-    assert set(warm_up._PARTS) <= set(done)
+    assert set(warm_up.PARTS) <= set(done)
     worker, done[:] = [*done], []
     warm_up.warm_up(5, 5)
     assert done == worker
@@ -55,8 +55,8 @@ def test_a_worker_that_compiles_is_ready_with_the_default_algorithm(done, monkey
     monkeypatch.setattr(warm_up.multiprocessing, "get_context", lambda _method: Context())
     later = warm_up.warm_up_worker(5, 5)
     later.join(60)
-    assert set(ready) == {*warm_up._DEFAULT, "time transfer_qmix"}
-    assert set(warm_up._PARTS) <= set(done)
+    assert set(ready) == {*warm_up.DEFAULT, "time transfer_qmix"}
+    assert set(warm_up.PARTS) <= set(done)
     assert "time ga" in done
 
 

@@ -65,7 +65,7 @@ def test_python_may_call_it_too(run, tmp_path, times):
 
 @pytest.mark.parametrize("first", ["", "quartered(4)", "halved(2)"], ids=str)
 def test_an_error_of_a_callee_tells_what_it_was(run, first):
-    """What it tells is kept apart from machine code, and has to be found again by whoever calls."""
+    """What it tells is kept apart from machine code, and each caller has to find it again."""
     asked = "try: eighth(12)\nexcept ValueError as error: print(error.args)"
     run(first)
     for _ in range(2):
