@@ -44,6 +44,7 @@ _IMPORT = re.compile(
     r"^[ \t]*(?:from (app[\w.]*) import (\([^)]*\)|[^\n]*)|import (app[^\n]*))", re.MULTILINE
 )
 _NAME = re.compile(r"\w+")
+_NAME_OF_MODULE = re.compile(r"app[\w.]*")
 
 
 @cache
@@ -85,7 +86,7 @@ def _imported(path: Path) -> tuple[Path, ...]:
     for package, imported, plain in _IMPORT.findall(path.read_text("utf-8")):
         # Of `from a import b`, both a and a.b may be modules.
         names.update([package, *(f"{package}.{name}" for name in _NAME.findall(imported))])
-        names.update(plain.replace(" ", "").split(","))
+        names.update(_NAME_OF_MODULE.findall(plain.split("#")[0]))
     return tuple(file for name in sorted(names) if name.split(".")[0] == "app" for file in _files(name))
 
 

@@ -70,3 +70,9 @@ def test_an_error_of_a_callee_tells_what_it_was(run, first):
     run(first)
     for _ in range(2):
         assert run(asked) == "('odd', 3)"
+
+
+def test_functions_copied_into_one_that_python_calls_have_no_other_callers(run):
+    """LLVM knows that, so it makes those with one caller a part of it."""
+    linked = "sum(line.startswith('define linkonce') for line in code.splitlines())"
+    assert run(f"quartered(12); code, = quartered.inspect_llvm().values(); print({linked})") == "0"

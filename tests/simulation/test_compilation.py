@@ -14,6 +14,7 @@ import pytest
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
+from app.simulation import callees, compilation
 from app.simulation.compilation import first_at, source_stamp, stamped_files
 
 MODULE = """
@@ -88,6 +89,7 @@ ROOT = Path(__file__).parents[2]
 
 AT_WORK = """
 import sys
+from app.simulation import callees, compilation
 from app.simulation.compilation import first_at
 
 with first_at("sorting") as first:
@@ -151,11 +153,13 @@ def compiled_functions():
                     yield module, function
 
 
-def test_the_stamp_of_a_function_covers_all_that_it_may_inline():
+def test_the_stamp_of_a_function_covers_all_that_it_may_inline_and_how_it_is_compiled():
     functions = list(compiled_functions())
     assert len(functions) > 100
+    how = {Path(inspect.getfile(module)) for module in (callees, compilation)}
     for module, function in functions:
         covered = stamped_files(Path(module.__file__))
+        assert how <= covered, module.__name__
         for name in function.py_func.__code__.co_names:
             inlined = function.py_func.__globals__.get(name)
             if isinstance(inlined, Dispatcher):
