@@ -83,7 +83,7 @@ INTERNAL_ERROR = "internal-error"
 
 def failure(code: str, detail: str) -> dict[str, Any]:
     """Return the error object of a failure that has no violations and no further facts."""
-    return {"code": code, "detail": detail, "violations": [], "details": {}}
+    return {"code": code, **to_record(detail), "violations": [], "details": {}}
 
 
 def describe(error: BaseException) -> dict[str, Any]:
@@ -99,4 +99,5 @@ def describe(error: BaseException) -> dict[str, Any]:
             "violations": [{"pointer": v.pointer, **to_record(v.detail)} for v in error.violations],
             "details": error.details,
         }
-    return failure(INTERNAL_ERROR, f"the work ended with {type(error).__name__}: {error}")
+    detail = said("the work ended with {kind}: {why}", kind=type(error).__name__, why=str(error))
+    return failure(INTERNAL_ERROR, detail)
