@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from app.domain.fields import MIN_MAGNITUDE
 from app.domain.said import Said, said
 
 _LONGEST_NAME = 100
@@ -56,6 +57,9 @@ def in_words(error: Mapping[str, Any], names: Sequence[str] = ()) -> str:
     kind, given, limits = error["type"], error.get("input"), error.get("ctx", {})
     if kind in NEEDS:
         return said(NEEDS[kind], given=_value(given))
+    if limits.get("ge") == MIN_MAGNITUDE and isinstance(given, int | float) and given <= 0:
+        # A limit that only keeps a number from being 0.
+        kind, limits = "greater_than", {"gt": 0}
     if kind in LIMITS:
         sentence, limit = LIMITS[kind]
         return said(sentence, given=_value(given), limit=limits[limit])

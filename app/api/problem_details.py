@@ -28,7 +28,7 @@ class Worded(BaseModel):
         default=None,
         description="`detail` with places for its values, the same for every error of its kind: the key of "
         "its translation; none where the service has no such sentence",
-        examples=["{given}, must be at least {limit}"],
+        examples=["{given}, must be more than {limit}"],
     )
     values: dict[str, Any] | None = Field(
         default=None,
@@ -37,7 +37,7 @@ class Worded(BaseModel):
         examples=[
             {
                 "given": {"detail": "is -5", "sentence": "is {value}", "values": {"value": -5}},
-                "limit": 1e-09,
+                "limit": 0,
             }
         ],
     )
@@ -55,7 +55,7 @@ class FieldError(Worded):
         description="JSON pointer (RFC 6901) into the body; empty for the body as a whole",
         examples=["/uavs/0/speed"],
     )
-    detail: str = Field(description="What is wrong", examples=["is -5, must be at least 1e-09"])
+    detail: str = Field(description="What is wrong", examples=["is -5, must be more than 0"])
     parameter: str | None = Field(
         default=None, description="The query parameter or header, where the error is not in the body"
     )
@@ -166,7 +166,7 @@ def responses(*codes: str) -> dict[int | str, dict[str, Any]]:
 
 _EXAMPLE_ERRORS: Mapping[str, Sequence[Mapping[str, str]]] = {
     "invalid-request": (
-        {"pointer": "/uavs/0/speed", "detail": "is -5, must be at least 1e-09"},
+        {"pointer": "/uavs/0/speed", "detail": "is -5, must be more than 0"},
         {
             "pointer": "/targets/2/priority",
             "detail": "unknown field `priority`; there are id, x, y, level, loadlist, deadline, service_time",

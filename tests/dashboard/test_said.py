@@ -60,6 +60,7 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     number: float = Field(default=1, gt=0, lt=1e6)
+    positive: float = Field(default=1, ge=1e-100)
     closed: float = Field(default=1, ge=0.5, le=9.5, allow_inf_nan=False)
     whole: int = 1
     text: str = Field(default="ab", min_length=2, max_length=4, pattern="^[a-z]+$")
@@ -70,6 +71,8 @@ class Model(BaseModel):
 
 WRONG = [
     {"number": 0},
+    {"positive": -0.5},
+    {"positive": 1e-200},
     {"number": 2e6},
     {"closed": 0.25},
     {"closed": 10},
@@ -151,9 +154,9 @@ def test_the_page_says_in_its_language_what_the_service_refuses(browser, service
         ready(page)
         uav = {"x_s": 0, "y_s": 0, "speed": 1, "voyage": 9, "loadlist": [3]}
         area = {"id": "area-1", "x": 1.5, "y": 1, "level": 2, "loadlist": [3]}
-        problem = {"uavs": [{**uav, "id": "a"}, {**uav, "id": "b", "voyage": -1.5}], "targets": [area]}
+        problem = {"uavs": [{**uav, "id": "a"}, {**uav, "id": "b", "speed": -1.5}], "targets": [area]}
         open_problem(page, problem, "un essai")
         go(page, "allocate")
         page.locator("#allocate-form button.primary").click()
         refused = page.locator("#violations li")
-        expect(refused).to_contain_text("b, autonomie vaut −1,5, doit être au moins 0")
+        expect(refused).to_contain_text("b, vitesse vaut −1,5, doit être supérieur à 0")
