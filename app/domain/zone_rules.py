@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.plane import BeyondProjection, Plane
-from app.domain.said import said, written
+from app.domain.said import Said, said
 from app.domain.world_fields import FEWEST_CORNERS
 
 if TYPE_CHECKING:
@@ -113,5 +113,5 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _written(corner: tuple[float, float]) -> str:
-    return f"({written(corner[0])}, {written(corner[1])})"
+def _written(corner: tuple[float, float]) -> Said:
+    return said("({x}, {y})", x=corner[0], y=corner[1])
