@@ -4,7 +4,7 @@
  */
 
 let texts = {};
-let service = {}; // what the service says: `errors` by their sentences, `fields` by their descriptions
+let service = {}; // what the service says: `errors`, `fields` and `algorithms`, each by its English text
 let plurals;
 let lists;
 let dates;
@@ -60,7 +60,7 @@ export function tNodes(text, values) {
 }
 
 /**
- * What the service says, in the language of the page. @param {"errors" | "fields"} part @param {string | null | undefined} text in English
+ * What the service says, in the language of the page. @param {"algorithms" | "errors" | "fields"} part @param {string | null | undefined} text in English
  * @returns {string | undefined} undefined where the language has no translation
  */
 export function ofService(part, text) {
