@@ -11,31 +11,37 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from app.domain.fields import MIN_MAGNITUDE
+from app.domain.said import Said, said
+
 _LONGEST_NAME = 100
 _MOST_DIGITS = 30
 
-_NEEDED = {
-    "float_type": "a number",
-    "float_parsing": "a number",
-    "int_type": "a whole number",
-    "int_parsing": "a whole number",
-    "int_from_float": "a whole number",
-    "int_parsing_size": "a smaller number",
-    "finite_number": "a finite number",
-    "string_type": "a text",
-    "bool_type": "true or false",
-    "bool_parsing": "true or false",
-    "list_type": "a list",
-    "dict_type": "an object",
-    "model_type": "an object",
-    "model_attributes_type": "an object",
+NEEDS: Mapping[str, str] = {
+    "float_type": "{given}, needs a number",
+    "float_parsing": "{given}, needs a number",
+    "int_type": "{given}, needs a whole number",
+    "int_parsing": "{given}, needs a whole number",
+    "int_from_float": "{given}, needs a whole number",
+    "int_parsing_size": "{given}, needs a smaller number",
+    "finite_number": "{given}, needs a finite number",
+    "string_type": "{given}, needs a text",
+    "bool_type": "{given}, needs true or false",
+    "bool_parsing": "{given}, needs true or false",
+    "list_type": "{given}, needs a list",
+    "dict_type": "{given}, needs an object",
+    "model_type": "{given}, needs an object",
+    "model_attributes_type": "{given}, needs an object",
 }
-_LIMITS: Mapping[str, tuple[str, str]] = {
-    "greater_than_equal": ("at least", "ge"),
-    "greater_than": ("more than", "gt"),
-    "less_than_equal": ("at most", "le"),
-    "less_than": ("less than", "lt"),
+"""What a value of another type is told, by the kind of error."""
+
+LIMITS: Mapping[str, tuple[str, str]] = {
+    "greater_than_equal": ("{given}, must be at least {limit:.15g}", "ge"),
+    "greater_than": ("{given}, must be more than {limit:.15g}", "gt"),
+    "less_than_equal": ("{given}, must be at most {limit:.15g}", "le"),
+    "less_than": ("{given}, must be less than {limit:.15g}", "lt"),
 }
+"""What a number beyond a limit is told, and the name of the limit, by the kind of error."""
 
 
 def in_words(error: Mapping[str, Any], names: Sequence[str] = ()) -> str:
@@ -49,45 +55,64 @@ def in_words(error: Mapping[str, Any], names: Sequence[str] = ()) -> str:
         Names of the fields there are beside it, for one that is unknown.
     """
     kind, given, limits = error["type"], error.get("input"), error.get("ctx", {})
-    if kind in _NEEDED:
-        return f"{_value(given)}, needs {_NEEDED[kind]}"
-    if kind in _LIMITS:
-        words, limit = _LIMITS[kind]
-        return f"{_value(given)}, must be {words} {_number(limits[limit])}"
+    if kind in NEEDS:
+        return said(NEEDS[kind], given=_value(given))
+    if limits.get("ge") == MIN_MAGNITUDE and isinstance(given, int | float) and given <= 0:
+        # A limit that only keeps a number from being 0.
+        kind, limits = "greater_than", {"gt": 0}
+    if kind in LIMITS:
+        sentence, limit = LIMITS[kind]
+        return said(sentence, given=_value(given), limit=limits[limit])
     say = _OTHERS.get(kind)
     return str(error["msg"]) if say is None else say(error, names)
 
 
 def _unknown(error: Mapping[str, Any], names: Sequence[str]) -> str:
-    name = str(error["loc"][-1])
-    near = difflib.get_close_matches(name[:_LONGEST_NAME], names, 1)
-    guess = f"did you mean `{near[0]}`? " if near else ""
-    there = f"there are {', '.join(names)}" if names else "there are none"
-    return f"unknown field `{name[:_LONGEST_NAME]}`; {guess}{there}"
+    name = str(error["loc"][-1])[:_LONGEST_NAME]
+    near = difflib.get_close_matches(name, names, 1)
+    if near:
+        return said(
+            "unknown field `{name}`; did you mean `{near}`? there are {names}",
+            name=name,
+            near=near[0],
+            names=list(names),
+        )
+    if names:
+        return said("unknown field `{name}`; there are {names}", name=name, names=list(names))
+    return said("unknown field `{name}`; there are none", name=name)
 
 
 def _text_length(error: Mapping[str, Any], _names: Sequence[str]) -> str:
-    limits = error["ctx"]
-    bound = _bound(limits)
-    return f"has {len(error['input'])} characters, {bound}"
+    limits, count = error["ctx"], len(error["input"])
+    if "min_length" in limits:
+        return said(
+            "has {count} characters, must have at least {least}", count=count, least=limits["min_length"]
+        )
+    return said("has {count} characters, must have at most {most}", count=count, most=limits["max_length"])
 
 
 def _list_length(error: Mapping[str, Any], _names: Sequence[str]) -> str:
     limits = error["ctx"]
-    return f"has {limits['actual_length']} elements, {_bound(limits)}"
-
-
-def _bound(limits: Mapping[str, Any]) -> str:
-    least = limits.get("min_length")
-    return f"must have at most {limits['max_length']}" if least is None else f"must have at least {least}"
+    count = limits["actual_length"]
+    if "min_length" in limits:
+        return said(
+            "has {count} elements, must have at least {least}", count=count, least=limits["min_length"]
+        )
+    return said("has {count} elements, must have at most {most}", count=count, most=limits["max_length"])
 
 
 def _choice(error: Mapping[str, Any], _names: Sequence[str]) -> str:
-    return f"must be {error['ctx']['expected']}"
+    return said("must be {expected}", expected=error["ctx"]["expected"])
+
+
+def _own(error: Mapping[str, Any], _names: Sequence[str]) -> str:
+    """Say what a check of the service's own has raised."""
+    raised = error["ctx"]["error"]
+    return raised.args[0] if isinstance(raised.args[0], Said) else str(raised)
 
 
 _OTHERS: Mapping[str, Callable[[Mapping[str, Any], Sequence[str]], str]] = {
-    "missing": lambda _error, _names: "is missing",
+    "missing": lambda _error, _names: said("is missing"),
     "extra_forbidden": _unknown,
     "string_too_short": _text_length,
     "string_too_long": _text_length,
@@ -95,26 +120,33 @@ _OTHERS: Mapping[str, Callable[[Mapping[str, Any], Sequence[str]], str]] = {
     "too_long": _list_length,
     "literal_error": _choice,
     "enum": _choice,
-    "string_unicode": lambda _error, _names: "has text that is not Unicode",
-    "string_pattern_mismatch": lambda error, _names: f"must match {error['ctx']['pattern']}",
-    "value_error": lambda error, _names: str(error["msg"]).removeprefix("Value error, "),
+    "string_unicode": lambda _error, _names: said("has text that is not Unicode"),
+    "string_pattern_mismatch": lambda error, _names: said(
+        "must match {pattern}", pattern=error["ctx"]["pattern"]
+    ),
+    "value_error": _own,
 }
 
 
-def _value(given: object) -> str:
+def _value(given: object) -> Said:
     """Say what was given: a number as it is, all else by its kind."""
     if given is None:
-        return "is null"
+        return said("is null")
     if isinstance(given, bool):
-        return f"is {str(given).lower()}"
-    if isinstance(given, int | float):
-        return f"is {_number(given)}"
+        return said("is true") if given else said("is false")
+    if isinstance(given, float):
+        return said("is {value:.15g}", value=given)
+    if isinstance(given, int):
+        # Beyond some thousand digits Python writes no integer out.
+        return (
+            said("is {value}", value=given) if abs(given) < 10**_MOST_DIGITS else said("has very many digits")
+        )
     if isinstance(given, str):
         # Parameters of a query come as text.
-        return f"is {given}" if len(given) <= _MOST_DIGITS and _is_number(given) else "is a text"
-    if isinstance(given, list | tuple):
-        return "is a list"
-    return "is an object"
+        if len(given) <= _MOST_DIGITS and _is_number(given):
+            return said("is {value}", value=given)
+        return said("is a text")
+    return said("is a list") if isinstance(given, list | tuple) else said("is an object")
 
 
 def _is_number(text: str) -> bool:
@@ -122,10 +154,3 @@ def _is_number(text: str) -> bool:
         return math.isfinite(float(text)) and text.isascii()
     except ValueError:
         return False
-
-
-def _number(number: float) -> str:
-    if isinstance(number, int):
-        # Beyond some thousand digits Python writes no integer out.
-        return f"{number}" if abs(number) < 10**_MOST_DIGITS else "a number of many digits"
-    return f"{number:.15g}"

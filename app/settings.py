@@ -71,8 +71,8 @@ class Settings(BaseSettings):
     tile_attribution: str = Field(default="", description="Whom the map names as the source of its tiles")
     overlay_file: Path | None = Field(
         default=None,
-        description="GeoJSON file (a FeatureCollection in degrees, at most 16 MiB) that the dashboard's map "
-        "shows above land and tiles: borders, roads, names",
+        description="File that the dashboard's map shows above land and tiles: GeoJSON (a FeatureCollection "
+        "in degrees, at most 16 MiB) with borders, roads, names, or PMTiles with pictures, of any size",
     )
 
     log_level: Literal["debug", "info", "warning", "error"] = Field(

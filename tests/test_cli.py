@@ -299,7 +299,7 @@ def test_a_plan_is_evaluated_without_a_server(tmp_path):
     file.write_text(json.dumps({**kept, "assignment": [[0]]}))
     refused = CliRunner().invoke(application, ["evaluate", str(file)])
     assert refused.exit_code == 1
-    assert "1 actions for" in refused.stderr
+    assert "1 actions, but there are 5 UAVs" in refused.stderr
 
 
 def test_flight_files_are_evaluated_without_a_server(tmp_path):

@@ -13,14 +13,13 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 import app
-from app.api.overlay import read_overlay
+from app.api.overlay import install_overlay
 from app.api.security_headers import page_policy
 from app.settings import Settings
 
 FOLDER = "/dashboard"
 _ICON = "/favicon.ico"
 """What a browser asks for where a page names no icon, such as the page to print."""
-_OVERLAY = "/overlay.geojson"
 _FILES = Path(app.__file__).parent / "dashboard"
 # A browser asks each time whether a file has changed: after an update no old module meets a new one.
 _FRESH = {"Cache-Control": "no-cache"}
@@ -50,15 +49,15 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
     Parameters
     ----------
     application
-        Gets ``/``, ``/dashboard/settings.json`` and the files beside it, and ``/overlay.geojson`` where the
-        settings name an overlay; that needs a key where others do.
+        Gets ``/``, ``/dashboard/settings.json`` and the files beside it, and the overlay where the settings
+        name one; that needs a key where others do.
     settings
         A tile server named there is the one place outside that the page may load pictures from.
 
     Raises
     ------
     OSError, ValueError
-        As :func:`app.api.overlay.read_overlay`.
+        As :func:`app.api.overlay.install_overlay`.
     """
     tiles = urlsplit(settings.tile_url or "")
     policy = page_policy(f"{tiles.scheme}://{tiles.netloc.replace('{s}', '*')}" if tiles.netloc else None)
@@ -66,7 +65,7 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
         "version": app.__version__,
         "tile_url": settings.tile_url,
         "tile_attribution": settings.tile_attribution,
-        "overlay": _OVERLAY.removeprefix("/") if settings.overlay_file else None,
+        "overlay": install_overlay(application, settings.overlay_file) if settings.overlay_file else None,
     }
 
     async def show_dashboard(request: Request) -> Response:  # noqa: ARG001 - a route's signature
@@ -82,10 +81,3 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
     application.add_route(_ICON, show_icon, include_in_schema=False)
     application.add_route(f"{FOLDER}/settings.json", tell_settings, include_in_schema=False)
     application.mount(FOLDER, _Files(directory=_FILES))
-    if settings.overlay_file:
-        overlay = read_overlay(settings.overlay_file)
-
-        async def show_overlay(request: Request) -> Response:  # noqa: ARG001 - a route's signature
-            return Response(overlay, media_type="application/geo+json", headers=_FRESH)
-
-        application.add_route(_OVERLAY, show_overlay, include_in_schema=False)

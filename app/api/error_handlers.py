@@ -24,6 +24,7 @@ from app.api.problem_details import FieldError, problem_response
 from app.api.problem_types import PROBLEM_TYPES
 from app.api.security_headers import SECURITY_HEADERS
 from app.domain.errors import AllocatorError, Violation
+from app.domain.said import said
 from app.field_errors import in_words
 from app.jobs import errors as job_errors
 from policy_store import errors as store_errors
@@ -107,7 +108,11 @@ def _parameter_error(item: Mapping[str, Any]) -> FieldError:
     """Say what is wrong outside of the body, which is checked by :mod:`app.api.body_validation`."""
     place, *location = item["loc"]
     name = "/".join(map(str, location))
-    return FieldError(pointer="", detail=f"{place} parameter: {in_words(item)}", parameter=name)
+    return FieldError(
+        pointer="",
+        detail=said("{place} parameter: {detail}", place=place, detail=in_words(item)),
+        parameter=name,
+    )
 
 
 def _http_error(request: Request, error: Exception) -> Response:
@@ -116,8 +121,8 @@ def _http_error(request: Request, error: Exception) -> Response:
     codes = {404: "not-found", 405: "method-not-allowed", 400: "bad-request"}
     code = codes.get(status.value, "internal-error")
     detail = {
-        404: f"there is nothing at {_instance(request)}",
-        405: f"{request.method} is not possible at {_instance(request)}",
+        404: said("there is nothing at {path}", path=_instance(request)),
+        405: said("{method} is not possible at {path}", method=request.method, path=_instance(request)),
     }.get(status.value, str(error.detail))
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED and (methods := _methods_at(request)):
@@ -168,14 +173,19 @@ def _known_error(request: Request, error: Exception) -> Response:
     if isinstance(error, job_errors.QueueFull | job_errors.Draining):
         wait_s = getattr(error, "retry_after_s", _DRAINING_RETRY_S)
         headers["Retry-After"] = str(max(1, math.ceil(wait_s)))
-    return problem_response(code, str(error), _instance(request), headers=headers)
+    return problem_response(code, _text_of(error), _instance(request), headers=headers)
+
+
+def _text_of(error: Exception) -> str:
+    """Return what an exception says, which ``str`` would make a text without its sentence."""
+    return error.args[0] if error.args and isinstance(error.args[0], str) else str(error)
 
 
 def _unstorable(request: Request, error: Exception) -> Response:
     _log.error("a request has what the database does not hold: %s", error)
     return problem_response(
         "invalid-request",
-        "the request has text or a number that the database cannot hold",
+        said("the request has text or a number that the database cannot hold"),
         _instance(request),
     )
 
@@ -184,8 +194,10 @@ def _store_unavailable(request: Request, error: Exception) -> Response:
     _log.error("the database does not answer: %s", error)
     return problem_response(
         "store-unavailable",
-        "the database does not answer now; whether a request that changes something was carried out is not "
-        "known, unless it comes again with the same Idempotency-Key",
+        said(
+            "the database does not answer now; whether a request that changes something was carried out is "
+            "not known, unless it comes again with the same Idempotency-Key"
+        ),
         _instance(request),
         headers={"Retry-After": "1"},
     )
@@ -199,7 +211,9 @@ def _defect(request: Request, error: Exception) -> Response:  # the server logs 
     identifier = correlation_id.get() or ""
     return problem_response(
         "internal-error",
-        "the service has a defect or its machine is in trouble; the log has more under this request's id",
+        said(
+            "the service has a defect or its machine is in trouble; the log has more under this request's id"
+        ),
         _instance(request),
         headers={"X-Request-ID": identifier, **SECURITY_HEADERS},
     )

@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.api.problem_details import FieldError
+from app.domain.said import from_record, noun, said
 
 
 class RequestError(Exception):
@@ -56,7 +57,7 @@ class MalformedJson(RequestError):
     """The body is no JSON (RFC 8259) in UTF-8, or has a name twice in one object."""
 
     def __init__(self, reason: str) -> None:
-        super().__init__("malformed-json", f"the body is not JSON in UTF-8: {reason}")
+        super().__init__("malformed-json", said("the body is not JSON in UTF-8: {why}", why=reason))
 
 
 class InvalidBody(RequestError):
@@ -89,7 +90,10 @@ class UnsupportedMediaType(RequestError):
     def __init__(self, given: str) -> None:
         super().__init__(
             "unsupported-media-type",
-            f"the body's content type is {given or 'not given'}, it has to be application/json",
+            said(
+                "the body's content type is {given}, it has to be application/json",
+                given=given or noun("not given"),
+            ),
             headers={"Accept": "application/json"},
         )
 
@@ -100,7 +104,7 @@ class UnsupportedContentEncoding(RequestError):
     def __init__(self, given: str) -> None:
         super().__init__(
             "unsupported-media-type",
-            f"the body's content encoding is {given}, it has to be sent as it is",
+            said("the body's content encoding is {given}, it has to be sent as it is", given=given),
             headers={"Accept-Encoding": "identity"},
         )
 
@@ -109,19 +113,22 @@ class BodyTooLarge(RequestError):
     """The body has more bytes than are taken."""
 
     def __init__(self, limit: int, announced: int | None) -> None:
-        size = "more" if announced is None else f"{announced} bytes"
-        super().__init__(
-            "body-too-large",
-            f"at most {limit} bytes are taken, the body has {size}",
-            extensions={"limit": limit},
-        )
+        if announced is None:
+            detail = said("at most {limit} bytes are taken, the body has more", limit=limit)
+        else:
+            detail = said(
+                "at most {limit} bytes are taken, the body has {size} bytes", limit=limit, size=announced
+            )
+        super().__init__("body-too-large", detail, extensions={"limit": limit})
 
 
 class BatchTooLarge(RequestError):
     """A batch has more allocations than are taken."""
 
     def __init__(self, limit: int, given: int) -> None:
-        detail = f"at most {limit} allocations are taken at once, the batch has {given}"
+        detail = said(
+            "at most {limit} allocations are taken at once, the batch has {count}", limit=limit, count=given
+        )
         super().__init__(
             "batch-too-large",
             detail,
@@ -143,7 +150,7 @@ class JobCancelled(RequestError):
     def __init__(self, job_id: str) -> None:
         super().__init__(
             "job-cancelled",
-            f"job {job_id} was cancelled before it had a plan",
+            said("job {id} was cancelled before it had a plan", id=job_id),
             extensions={"job_id": job_id},
         )
 
@@ -160,12 +167,13 @@ class JobFailed(RequestError):
     """
 
     def __init__(self, job_id: str, error: Mapping[str, Any], blamed: str | None = None) -> None:
-        errors = [FieldError(pointer=v["pointer"], detail=v["detail"]) for v in error["violations"]]
+        detail = from_record(error)
+        errors = [FieldError(**violation) for violation in error["violations"]]
         if not errors and blamed is not None:
-            errors = [FieldError(pointer=blamed, detail=error["detail"])]
+            errors = [FieldError(pointer=blamed, detail=detail)]
         super().__init__(
             error["code"],
-            error["detail"],
+            detail,
             errors=errors,
             extensions={**error["details"], "job_id": job_id},
         )
@@ -187,4 +195,4 @@ class ExampleNotFound(RequestError):
     """No example has that name."""
 
     def __init__(self, name: str) -> None:
-        super().__init__("not-found", f"there is no example {name!r}")
+        super().__init__("not-found", said("there is no example {name!r}", name=name))

@@ -11,6 +11,7 @@ from app.api.problem_models import to_problem
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record, to_record
+from app.domain.said import said
 from app.settings import Settings
 
 
@@ -46,14 +47,17 @@ def _plan(body: EvaluationRequest, problem: Problem) -> ReadPlan:
         If there is none, two, or one that is not of this problem.
     """
     if (body.assignment is None) == (body.flight_files is None):
-        detail = "one of `assignment` and `flight_files` is needed, and only one"
+        detail = said("one of `assignment` and `flight_files` is needed, and only one")
         raise InvalidProblem.of([Violation("/assignment", detail)])
     if body.flight_files is not None:
         files = [ReadFile(each.name, each.uav_id, each.content) for each in body.flight_files]
         return plan_of_files(problem, files, body.match_within)
     assert body.assignment is not None
     violations = [
-        Violation(f"/assignment/{s}", f"{len(row)} actions for {problem.n_uavs} UAVs")
+        Violation(
+            f"/assignment/{s}",
+            said("{count} actions, but there are {uavs} UAVs", count=len(row), uavs=problem.n_uavs),
+        )
         for s, row in enumerate(body.assignment)
         if len(row) != problem.n_uavs
     ]
@@ -78,11 +82,13 @@ def _amounts(
     for name, amounts in given.items():
         if amounts is not None and not planned[name]:
             rule = "`objective.unloading`" if name == "delivered" else "`objective.loading`, with bases,"
-            violations.append(Violation(f"/{name}", f"amounts are given, and {rule} is not planned"))
+            violations.append(
+                Violation(f"/{name}", said("amounts are given, and {rule} is not planned", rule=rule))
+            )
     if not violations and len({given[name] is None for name, asked in planned.items() if asked}) > 1:
         missing = next(name for name in given if given[name] is None)
         violations.append(
-            Violation(f"/{missing}", "`delivered` and `loaded` are given together, or neither is")
+            Violation(f"/{missing}", said("`delivered` and `loaded` are given together, or neither is"))
         )
     if not violations:
         violations = [
@@ -107,15 +113,25 @@ def _misfits(
     """Yield where amounts have another shape than the plan, or are below 0 where nothing can be."""
     materials, steps = len(body.uavs[0].loadlist), len(assignment)
     if len(amounts) != steps:
-        yield Violation(f"/{name}", f"{len(amounts)} steps, but `assignment` has {steps}")
+        yield Violation(
+            f"/{name}", said("{count} steps, but `assignment` has {steps}", count=len(amounts), steps=steps)
+        )
     for s, row in enumerate(amounts):
         if len(row) != len(body.uavs):
-            yield Violation(f"/{name}/{s}", f"amounts of {len(row)} UAVs, but there are {len(body.uavs)}")
+            yield Violation(
+                f"/{name}/{s}",
+                said("amounts of {count} UAVs, but there are {uavs}", count=len(row), uavs=len(body.uavs)),
+            )
         for i, each in enumerate(row):
             if each is not None and len(each) != materials:
                 yield Violation(
-                    f"/{name}/{s}/{i}", f"{len(each)} amounts, but there are {materials} materials"
+                    f"/{name}/{s}/{i}",
+                    said(
+                        "{count} amounts, but there are {materials} materials",
+                        count=len(each),
+                        materials=materials,
+                    ),
                 )
             for k, amount in enumerate(each or ()):
                 if amount < 0.0 and name == "delivered":
-                    yield Violation(f"/{name}/{s}/{i}/{k}", f"{amount:g} is less than 0")
+                    yield Violation(f"/{name}/{s}/{i}/{k}", said("{amount:g} is less than 0", amount=amount))

@@ -10,9 +10,10 @@ from pydantic import Field
 from starlette.responses import Response
 
 from app.api.allocation_models import AnswerModel
-from app.api.problem_details import FieldError
+from app.api.problem_details import FieldError, Worded
 from app.api.problem_models import ProblemModel
-from app.api.problem_types import type_of
+from app.api.problem_types import title_of, type_of
+from app.domain.said import from_record
 from app.jobs import model
 from app.jobs.model import Job, JobPage, JobStatus
 from app.jobs.stored_json import write
@@ -33,12 +34,13 @@ class ProgressModel(ProgressSummary):
     answered_by: str | None = Field(default=None, description="The algorithm that found it")
 
 
-class JobErrorModel(AnswerModel):
+class JobErrorModel(AnswerModel, Worded):
     """Why a job failed."""
 
     type: str = Field(
         description="Stable name, as the `type` of a problem", examples=[type_of("worker-lost")]
     )
+    title: str = Field(description="What the type means, for people")
     detail: str = Field(description="What went wrong")
     errors: list[FieldError] = Field(description="Field by field, where that is known")
     details: dict[str, Any] = Field(description="Further facts, such as the `sizes` there are")
@@ -152,7 +154,8 @@ def _fields(job: model.JobSummary) -> dict[str, Any]:
         if error is None
         else JobErrorModel(
             type=type_of(error["code"]),
-            detail=error["detail"],
+            title=title_of(error["code"]),
+            detail=from_record(error),
             errors=[FieldError(**violation) for violation in error["violations"]],
             details=error["details"],
         ),

@@ -33,6 +33,7 @@ from app.api.errors import (
 )
 from app.api.json_structure import FEW_VALUES, MOST_NAMES, NestedTooDeep, UnlikelyShape, require_likely_shape
 from app.api.problem_details import FieldError, problem_response
+from app.domain.said import said
 from app.settings import Settings
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -70,7 +71,7 @@ class JsonRoute(APIRoute):
             # A time limit begins here: how long the client took to send is not in the service's hands.
             request.state.arrived_s = time.monotonic()
             if not body:
-                raise InvalidBody([FieldError(pointer="", detail="is empty, needs a JSON object")])
+                raise InvalidBody([FieldError(pointer="", detail=said("is empty, needs a JSON object"))])
             _require_json(request.headers.get("content-type", ""))
             _require_plain(request.headers.get("content-encoding", ""))
             settings = cast(Settings, request.app.state.services.settings)
@@ -157,16 +158,16 @@ def parse_json(body: bytes) -> Any:
         text = body.decode("utf-8")
         return json.loads(text, object_pairs_hook=_unique_names)
     except UnicodeDecodeError as error:
-        raise MalformedJson(f"byte {error.start} is not UTF-8") from None
+        raise MalformedJson(said("byte {place} is not UTF-8", place=error.start)) from None
     except json.JSONDecodeError as error:
         before, after = error.doc[max(0, error.pos - _SHOWN) : error.pos], error.doc[error.pos :][:_SHOWN]
         shown = f"{before!a} and then {after!a}" if after else f"{before!a} and then nothing"
         reason = f"{error.msg}: line {error.lineno} column {error.colno}, after {shown}"
         raise MalformedJson(reason) from None
     except RecursionError:
-        raise MalformedJson("it is nested too deep") from None
+        raise MalformedJson(said("it is nested too deep")) from None
     except ValueError:
-        raise MalformedJson("an integer has too many digits") from None
+        raise MalformedJson(said("an integer has too many digits")) from None
 
 
 def _names_in(value: Any) -> int:
@@ -182,12 +183,14 @@ def _names_in(value: Any) -> int:
 
 def _unique_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(pairs) > MOST_NAMES:
-        detail = f"an object has {len(pairs)} names, at most {MOST_NAMES} are taken"
+        detail = said(
+            "an object has {count} names, at most {most} are taken", count=len(pairs), most=MOST_NAMES
+        )
         raise InvalidBody([FieldError(pointer="", detail=detail)])
     names = dict(pairs)
     if len(names) != len(pairs):
         twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
-        raise MalformedJson(f"{twice[:100]!a} is twice in one object")
+        raise MalformedJson(said("{name!a} is twice in one object", name=twice[:100]))
     return names
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from app.domain.said import noun, said
+
 FEW_CONTAINERS, FEW_VALUES, FEW_ESCAPES = 20_000, 250_000, 100_000
 """What is built at once: some megabytes, in some hundredths of a second."""
 
@@ -123,7 +125,7 @@ def require_likely_shape(text: bytes, longest_list: int, most_values: int = FEW_
             commas = token.group().count(b",") if is_whole else 0
             path.append(_Open(first == _LIST, commas))
             if len(path) > DEEPEST:
-                raise NestedTooDeep("", f"it is nested more than {DEEPEST} deep")
+                raise NestedTooDeep("", said("it is nested more than {most} deep", most=DEEPEST))
             if is_whole:
                 flat += commas
                 _require_short(path, longest_list)
@@ -143,9 +145,10 @@ def _require_short(path: list[_Open], longest_list: int) -> None:
     innermost = path[-1]
     limit = longest_list if innermost.is_list else MOST_NAMES
     if innermost.values >= limit:
-        what = "elements" if innermost.is_list else "names"
+        what = noun("elements") if innermost.is_list else noun("names")
         raise UnlikelyShape(
-            _pointer(path[:-1]), f"has more than {limit} {what}, the most that a request can have"
+            _pointer(path[:-1]),
+            said("has more than {most} {items}, the most that a request can have", most=limit, items=what),
         )
 
 

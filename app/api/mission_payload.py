@@ -12,10 +12,12 @@ from app.api.errors import InvalidBody
 from app.api.mission_models import MissionRequest
 from app.api.problem_details import FieldError
 from app.api.problem_models import to_problem
+from app.api.problem_types import title_of
 from app.api.wire_fields import WireModel, from_wire
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.identifiers import fault_of
 from app.domain.problem import Problem
+from app.domain.said import from_record, to_record
 from app.missions import events
 from app.missions.model import Mission, Planning, Proposal
 from app.missions.state import without_plan
@@ -82,7 +84,8 @@ def mission_answer(mission: Mission) -> dict[str, Any]:
         if trouble is None
         else {
             "type": trouble["code"],
-            "detail": trouble["detail"],
+            "title": title_of(trouble["code"]),
+            **to_record(from_record(trouble)),
             "errors": trouble["violations"],
             "details": trouble["details"],
         },

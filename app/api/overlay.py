@@ -1,4 +1,4 @@
-"""The operator's own layer of the dashboard's map: a file of GeoJSON, checked when the service starts."""
+"""The operator's own layer of the dashboard's map: GeoJSON or PMTiles, checked when the service starts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,16 @@ import re
 from pathlib import Path
 from typing import Any
 
+from fastapi import FastAPI
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+
+from app.api.overlay_tiles import is_archive, require_pictures
+
+_FEATURES, _TILES = "overlay.geojson", "overlay.pmtiles"
+# As the page's own files: a browser asks each time whether it has changed.
+_FRESH = {"Cache-Control": "no-cache"}
+
 MOST_BYTES = 16 * 1024**2
 """Of an overlay; a page draws all of it."""
 
@@ -14,8 +24,42 @@ _DEGREES = re.compile(r"(CRS84h?|EPSG:[\d.]*:?(4326|4979))$", re.IGNORECASE)
 """Names of longitude and latitude on WGS 84."""
 
 
+def install_overlay(application: FastAPI, path: Path) -> str:
+    """Serve an overlay: features whole, and of tiles the parts that are asked for.
+
+    Returns
+    -------
+    str
+        The path where it is, relative to that of the page.
+
+    Raises
+    ------
+    OSError, ValueError
+        As :func:`read_overlay` and :func:`~app.api.overlay_tiles.require_pictures`.
+    """
+    if is_archive(path):
+        require_pictures(path, _called(path))
+
+        async def show_tiles(request: Request) -> Response:  # noqa: ARG001 - a route's signature
+            return FileResponse(path, media_type="application/octet-stream", headers=_FRESH)
+
+        application.add_route(f"/{_TILES}", show_tiles, include_in_schema=False)
+        return _TILES
+    overlay = read_overlay(path)
+
+    async def show_features(request: Request) -> Response:  # noqa: ARG001 - a route's signature
+        return Response(overlay, media_type="application/geo+json", headers=_FRESH)
+
+    application.add_route(f"/{_FEATURES}", show_features, include_in_schema=False)
+    return _FEATURES
+
+
+def _called(path: Path) -> str:
+    return f"ALLOCATOR_OVERLAY_FILE ({path})"
+
+
 def read_overlay(path: Path) -> bytes:
-    """Read an overlay.
+    """Read an overlay of features.
 
     Parameters
     ----------
@@ -34,7 +78,7 @@ def read_overlay(path: Path) -> bytes:
     ValueError
         It is too large, no JSON, no FeatureCollection, or in other coordinates.
     """
-    name = f"ALLOCATOR_OVERLAY_FILE ({path})"
+    name = _called(path)
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise ValueError(f"{name} has {size} bytes, at most {MOST_BYTES} are taken")

@@ -11,6 +11,7 @@ from app.api.wire_fields import WireModel, from_wire, wire_model
 from app.domain.errors import InvalidProblem, ProblemTooLarge, Violation, escaped
 from app.domain.fields import Amounts, Items, Kind, Named, declared_fields
 from app.domain.problem import Problem
+from app.domain.said import Said, noun, said
 from app.domain.text_fields import Words
 from app.domain.world_fields import Corners, Table
 from app.settings import Settings
@@ -91,30 +92,30 @@ def to_problem(body: ProblemModel, settings: Settings, at: str = "") -> Problem:
     return problem
 
 
-_Size = tuple[str, str, int, int | None]
+_Size = tuple[str, Said, int, int | None]
 """Of a list: JSON pointer, what it counts, how many there are, how many are taken; None: as many as are."""
 
 
 def _sizes(lists: Mapping[str, Sequence[Any]], n_materials: int, settings: Settings) -> Iterator[_Size]:
     for name, kind in _LISTS.items():
-        yield f"/{name}", kind.called, len(lists[name]), largest(name, settings)
+        yield f"/{name}", noun(kind.called), len(lists[name]), largest(name, settings)
     # The first UAV says how many materials there are.
-    yield "/uavs/0/loadlist", "materials", n_materials, settings.max_materials
+    yield "/uavs/0/loadlist", noun("materials"), n_materials, settings.max_materials
 
 
 def _sizes_of_tables(problem: object, settings: Settings) -> Iterator[_Size]:
     """Yield the sizes of what can be large in few items: a model's, or of a body not yet looked at."""
     polygons = [_items(_field(zone, "polygon")) for zone in _items(_field(problem, "no_fly_zones"))]
     corners = sum(map(len, polygons))
-    yield "/no_fly_zones", "corners of no-fly zones", corners, settings.max_zone_corners
+    yield "/no_fly_zones", noun("corners of no-fly zones"), corners, settings.max_zone_corners
     matrices = _field(problem, "matrices")
     if not isinstance(matrices, Mapping):
         return
-    yield "/matrices", "profiles", len(matrices), settings.max_profiles
+    yield "/matrices", noun("profiles"), len(matrices), settings.max_profiles
     for name, matrix in islice(matrices.items(), settings.max_profiles):
         for table in ("distance", "duration"):
             rows = len(_items(_field(matrix, table)))
-            yield f"/matrices/{escaped(name)}/{table}", "rows", rows, settings.max_locations
+            yield f"/matrices/{escaped(name)}/{table}", noun("rows"), rows, settings.max_locations
 
 
 def _sizes_of_words(lists: Mapping[str, Sequence[Any]], settings: Settings) -> Iterator[_Size]:
@@ -124,20 +125,24 @@ def _sizes_of_words(lists: Mapping[str, Sequence[Any]], settings: Settings) -> I
                 words = [words or () for words in map(attrgetter(each.name), lists[name])]
                 longest = max(map(len, words), default=0)
                 index = next((at for at, some in enumerate(words) if len(some) == longest), 0)
-                what = "words" if each.kind.ids_of is None else "ids"
+                what = noun("words") if each.kind.ids_of is None else noun("ids")
                 limit = most_elements(each.kind, settings)
                 yield f"/{name}/{index}/{each.name}", what, longest, limit
 
 
 def _refuse(sizes: Sequence[_Size], at: str) -> None:
     violations = [
-        Violation(at + pointer, f"{size} {what}, at most {limit} are taken")
+        Violation(
+            at + pointer,
+            said("{count} {items}, at most {most} are taken", count=size, items=what, most=limit),
+        )
         for pointer, what, size, limit in sizes
         if limit is not None and size > limit
     ]
     if violations:
-        detail = "; ".join(violation.detail for violation in violations)
-        raise ProblemTooLarge(detail, violations)
+        first = violations[0].detail
+        several = "; ".join(violation.detail for violation in violations)
+        raise ProblemTooLarge(several if len(violations) > 1 else first, violations)
 
 
 def _field(of: object, name: str) -> object:

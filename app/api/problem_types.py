@@ -276,6 +276,11 @@ PROBLEM_TYPES: Mapping[str, ProblemType] = {
 }
 
 
+def title_of(code: str) -> str:
+    """Return what an error code means, for people; what a defect means for one that is not in the table."""
+    return PROBLEM_TYPES.get(code, PROBLEM_TYPES[DEFECT]).meaning
+
+
 def status_of(code: str) -> HTTPStatus:
     """Give an error code its status; 500 for one that is not in the table."""
     return HTTPStatus(PROBLEM_TYPES.get(code, PROBLEM_TYPES[DEFECT]).status)

@@ -23,6 +23,7 @@ from structlog.contextvars import bound_contextvars
 from app.api.connections import BoundedProtocol
 from app.api.problem_details import problem_response
 from app.api.security_headers import SECURITY_HEADERS
+from app.domain.said import said
 
 
 def protocol_with_deadline(seconds: float) -> type[BoundedProtocol]:
@@ -141,7 +142,8 @@ class _DeadlineProtocol(BoundedProtocol):
             self.logger.info("a request was not received within %g s", self.receive_timeout_s)
         if self._receives():
             self._refuse(
-                "request-timeout", f"the request was not received within {self.receive_timeout_s:g} s"
+                "request-timeout",
+                said("the request was not received within {seconds} s", seconds=self.receive_timeout_s),
             )
         else:
             self.transport.close()

@@ -19,6 +19,7 @@ from app.domain.errors import (
     Violation,
 )
 from app.domain.records import problem_to_record
+from app.domain.said import said
 from app.solvers.registry import ALGORITHMS, algorithm, parse_parameters, require_supported
 
 _BASE64_BYTES, _BASE64_CHARACTERS = 3, 4
@@ -66,13 +67,13 @@ def checkpoint_payload(body: RegisterCheckpoint, services: Services) -> dict[str
         If they are more than is taken, or no ASCII text; all else is found by the job.
     """
     if not body.checkpoint.isascii():
-        detail = "the checkpoint is not base64: it has characters beyond ASCII"
+        detail = said("the checkpoint is not base64: it has characters beyond ASCII")
         raise InvalidCheckpoint(detail, [Violation("/checkpoint", detail)])
     limit = services.settings.max_checkpoint_bytes
     padding = body.checkpoint[-2:].count("=")
     size = len(body.checkpoint) * _BASE64_BYTES // _BASE64_CHARACTERS - padding
     if size > limit:
-        detail = f"the checkpoint has {size} bytes, at most {limit} are taken"
+        detail = said("the checkpoint has {size} bytes, at most {limit} are taken", size=size, limit=limit)
         raise InvalidCheckpoint(detail, [Violation("/checkpoint", detail)])
     task = to_problem(body.task, services.settings, "/task")
     return {
@@ -110,7 +111,7 @@ async def job_payload(body: RegisterJob, services: Services) -> dict[str, Any]:
 
 def _does_not_learn(name: str) -> UnknownAlgorithm:
     names = [each.name for each in ALGORITHMS.values() if each.learns]
-    detail = f"{name!r} does not learn; there are {', '.join(names)}"
+    detail = said("{name!r} does not learn; there are {names}", name=name, names=names)
     return UnknownAlgorithm(detail, [Violation("/algorithm", detail)], {"algorithms": names})
 
 

@@ -677,6 +677,14 @@ class Example(TypedDict):
 class FieldError(TypedDict):
     """One thing that is wrong with a request."""
 
+    sentence: NotRequired[str | None]
+    """`detail` with places for its values, the same for every error of its kind: the key of its
+    translation; none where the service has no such sentence."""
+
+    values: NotRequired[dict[str, Any] | None]
+    """By the places in `sentence`: a number, a text, a list of texts, or an object with `detail`,
+    `sentence` and `values` of its own."""
+
     pointer: str
     """JSON pointer (RFC 6901) into the body; empty for the body as a whole."""
 
@@ -739,8 +747,19 @@ class HistoryModel(TypedDict):
 class JobError(TypedDict):
     """Why a job failed."""
 
+    sentence: NotRequired[str | None]
+    """`detail` with places for its values, the same for every error of its kind: the key of its
+    translation; none where the service has no such sentence."""
+
+    values: NotRequired[dict[str, Any] | None]
+    """By the places in `sentence`: a number, a text, a list of texts, or an object with `detail`,
+    `sentence` and `values` of its own."""
+
     type: str
     """Stable name, as the `type` of a problem."""
+
+    title: str
+    """What the type means, for people."""
 
     detail: str
     """What went wrong."""
@@ -2262,11 +2281,19 @@ class ZonesChangedEvent(TypedDict):
 class ProblemDetails(TypedDict):
     """Problem details (RFC 9457). Some problems have more members, such as `sizes` or `algorithms`."""
 
+    sentence: NotRequired[str | None]
+    """`detail` with places for its values, the same for every error of its kind: the key of its
+    translation; none where the service has no such sentence."""
+
+    values: NotRequired[dict[str, Any] | None]
+    """By the places in `sentence`: a number, a text, a list of texts, or an object with `detail`,
+    `sentence` and `values` of its own."""
+
     type: str
     """Stable name of the problem; it leads to what it means and what to do about it."""
 
     title: str
-    """The same for people."""
+    """What the type means, for people; the same for every problem of the type."""
 
     status: int
     """HTTP status."""

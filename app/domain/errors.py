@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One broken rule: where (a JSON pointer into the request, RFC 6901) and what."""
+    """One broken rule: where (a JSON pointer into the request, RFC 6901) and what, mostly :class:`.Said`."""
 
     pointer: str
     detail: str

@@ -30,8 +30,10 @@ from app.domain.fields import (
     Number,
     Part,
     declared_fields,
+    too_few,
 )
 from app.domain.identifiers import fault_of
+from app.domain.said import said
 
 Floats = npt.NDArray[np.float64]
 
@@ -162,7 +164,7 @@ def violations_of(item: Any, at: str, context: Context) -> Iterator[Violation]:
 
 def _violations_of_items(items: Sequence[Any], at: str, kind: Items, context: Context) -> Iterator[Violation]:
     if len(items) < kind.least:
-        yield Violation(at, f"{len(items)} {kind.called}; at least {kind.least} is needed")
+        yield Violation(at, too_few(len(items), kind.called, kind.least))
     declared = declared_fields(kind.of)
     named = [each.name for each in declared if isinstance(each.kind, Identifier) and each.kind.unique]
     first: dict[str, int] = {}
@@ -170,7 +172,9 @@ def _violations_of_items(items: Sequence[Any], at: str, kind: Items, context: Co
         for name in named:
             identifier = getattr(item, name)
             if identifier in first:
-                detail = f"{identifier!r} is already the id of number {first[identifier]}"
+                detail = said(
+                    "{id!r} is already the id of number {other}", id=identifier, other=first[identifier]
+                )
                 yield Violation(f"{at}/{index}/{name}", detail)
             elif fault_of(identifier) is None:
                 first[identifier] = index

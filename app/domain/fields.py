@@ -18,6 +18,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from app.domain.errors import Violation
 from app.domain.identifiers import fault_of
+from app.domain.said import Said, noun, said
 from app.domain.units import PLACE, Axis, Unit
 
 MAX_MAGNITUDE = 1e12
@@ -100,7 +101,12 @@ class Number(Kind):
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:
         """Yield what is wrong with the number."""
         if self.below and math.isfinite(value) and not self.low <= value < self.high:
-            yield Violation(pointer, f"{written(value)} is not from {self.low:g} to below {self.high:g}")
+            yield Violation(
+                pointer,
+                said(
+                    "{value} is not from {low:g} to below {high:g}", value=value, low=self.low, high=self.high
+                ),
+            )
             return
         yield from out_of_limits(pointer, value, *self.limits(context))
 
@@ -144,7 +150,14 @@ class Amounts(Kind):
         """Yield what is wrong with their number, and with each of them."""
         materials = context.n_materials
         if materials is not None and len(value) != materials:
-            yield Violation(pointer, f"{len(value)} amounts, but the first UAV carries {materials} materials")
+            yield Violation(
+                pointer,
+                said(
+                    "{count} amounts, but the first UAV carries {materials} materials",
+                    count=len(value),
+                    materials=materials,
+                ),
+            )
         for k, amount in enumerate(value):
             yield from out_of_limits(f"{pointer}/{k}", amount, *self.limits(context))
 
@@ -173,7 +186,9 @@ class Whole(Kind):
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
         """Yield what is wrong with the number."""
         if not self.low <= value <= self.high:
-            yield Violation(pointer, f"{value} is not in {self.low}..{self.high}")
+            yield Violation(
+                pointer, said("{value} is not in {low}..{high}", value=value, low=self.low, high=self.high)
+            )
 
 
 @dataclass(frozen=True)
@@ -204,7 +219,10 @@ class Choice(Kind):
         """Yield that it is none of the words."""
         if value not in self.options:
             *others, last = map(repr, self.options)
-            yield Violation(pointer, f"{value!r} is neither {', '.join(others)} nor {last}")
+            yield Violation(
+                pointer,
+                said("{value!r} is neither {others} nor {last}", value=value, others=others, last=last),
+            )
 
 
 @dataclass(frozen=True)
@@ -271,7 +289,7 @@ class Named(Part):
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:  # noqa: ARG002 - of all kinds
         """Yield that there are none, and the names that could not be an identifier."""
         if not value:
-            yield Violation(pointer, f"0 {self.called}; at least 1 is needed")
+            yield Violation(pointer, too_few(0, self.called, 1))
         for name in value:
             fault = fault_of(name)
             if fault is not None:
@@ -348,15 +366,14 @@ def _default(of_dataclass: Any) -> Any:
     return of_dataclass.default if factory is MISSING else factory()
 
 
+def too_few(count: int, called: str, least: int) -> Said:
+    """Say that there are too few of what is counted."""
+    return said("{count} {items}; at least {least} is needed", count=count, items=noun(called), least=least)
+
+
 def out_of_limits(pointer: str, value: float, low: float, high: float) -> Iterator[Violation]:
     """Yield that a number is not finite, or beyond its limits."""
     if not math.isfinite(value):
-        yield Violation(pointer, f"{value} is not a finite number")
+        yield Violation(pointer, said("{value} is not a finite number", value=value))
     elif not low <= value <= high:
-        yield Violation(pointer, f"{written(value)} is not in {low:g}..{high:g}")
-
-
-def written(value: float) -> str:
-    """Write a number briefly, but never as another one: 180.0000001 is not 180."""
-    brief = f"{value:g}"
-    return brief if float(brief) == value else repr(float(value))
+        yield Violation(pointer, said("{value} is not in {low:g}..{high:g}", value=value, low=low, high=high))

@@ -12,6 +12,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from app.domain.said import said
+
 MAX_ID_LENGTH = 100
 """Longest identifier, in characters."""
 
@@ -32,7 +34,7 @@ def fault_of(identifier: str) -> str | None:
         One clause, with the character that is at fault and its place, counted from 1.
     """
     if not 1 <= len(identifier) <= MAX_ID_LENGTH:
-        return f"{len(identifier)} characters, not in 1..{MAX_ID_LENGTH}"
+        return said("{count} characters, not in 1..{most}", count=len(identifier), most=MAX_ID_LENGTH)
     if identifier.isprintable():
         return None
     found = _NEVER.search(identifier)
@@ -42,16 +44,21 @@ def fault_of(identifier: str) -> str | None:
     character = identifier[place]
     category = unicodedata.category(character)
     if category == "Cc":
-        why = "a control character"
+        why = said("a control character")
     elif category == "Cs":
-        why = "half of a surrogate pair"
+        why = said("half of a surrogate pair")
     elif found:
-        why = "which makes the text after it read in another order"
+        why = said("which makes the text after it read in another order")
     else:
-        why = "which is not closed, so the text after it reads in another order"
+        why = said("which is not closed, so the text after it reads in another order")
     name = unicodedata.name(character, "")
-    code = f"U+{ord(character):04X}{' ' if name else ''}{name}"
-    return f"{identifier!r} has {code} as character {place + 1}, {why}"
+    return said(
+        "{id!r} has {character} as character {place}, {why}",
+        id=identifier,
+        character=f"U+{ord(character):04X}{' ' if name else ''}{name}",
+        place=place + 1,
+        why=why,
+    )
 
 
 def _left_open(identifier: str) -> int | None:

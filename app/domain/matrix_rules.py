@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.domain.errors import escaped
+from app.domain.said import said
 
 if TYPE_CHECKING:
     from app.domain.matrices import Matrix
@@ -31,7 +32,10 @@ def broken_rules_of_matrices(problem: Problem) -> Rules:
             if values.count(None) < len(values):
                 for index, value in enumerate(values):
                     if value is not None:
-                        yield f"/{name}/{index}/{field}", f"{value!r} needs `matrices`, and there are none"
+                        yield (
+                            f"/{name}/{index}/{field}",
+                            said("{value!r} needs `matrices`, and there are none", value=value),
+                        )
         return
     if not problem.matrices:
         return
@@ -44,9 +48,17 @@ def broken_rules_of_matrices(problem: Problem) -> Rules:
             row, at = getattr(item, field), f"/{name}/{index}/{field}"
             if row is None:
                 if field == "location":
-                    yield at, "is missing; with `matrices` every UAV, target and base has one"
+                    yield at, said("is missing; with `matrices` every UAV, target and base has one")
             elif size is not None and not 0 <= row < size:
-                yield at, f"{row} is not in 0..{size - 1}, the rows of the `matrices`"
+                yield (
+                    at,
+                    said(
+                        "{value} is not in {low}..{high}, the rows of the `matrices`",
+                        value=row,
+                        low=0,
+                        high=size - 1,
+                    ),
+                )
 
 
 def _rows(table: object) -> int | None:
@@ -60,9 +72,12 @@ def _sizes(matrices: dict[str, Matrix]) -> Rules:
     for name, matrix in matrices.items():
         rows, durations = _rows(matrix.distance), _rows(matrix.duration)
         if None not in (rows, size) and rows != size:
-            yield f"/matrices/{escaped(name)}/distance", f"{rows} rows, but {first!r} has {size}"
+            yield (
+                f"/matrices/{escaped(name)}/distance",
+                said("{rows} rows, but {other!r} has {size}", rows=rows, other=first, size=size),
+            )
         if None not in (rows, durations) and durations != rows:
-            detail = f"{durations} rows, but its `distance` has {rows}"
+            detail = said("{rows} rows, but its `distance` has {size}", rows=durations, size=rows)
             yield f"/matrices/{escaped(name)}/duration", detail
 
 
@@ -71,6 +86,13 @@ def _profile(at: str, uav: UAV, matrices: dict[str, Matrix]) -> Rules:
     there = ", ".join(names) + (", …" if len(matrices) > _NAMED else "")
     if uav.profile is None:
         if len(matrices) > 1:
-            yield at, f"is missing; the `matrices` have several: {there}"
+            yield at, said("is missing; the `matrices` have several: {there}", there=there)
     elif uav.profile not in matrices:
-        yield at, f"{uav.profile!r} is no profile of the `matrices`, which have {there}"
+        yield (
+            at,
+            said(
+                "{profile!r} is no profile of the `matrices`, which have {there}",
+                profile=uav.profile,
+                there=there,
+            ),
+        )

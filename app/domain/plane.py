@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import eastward, longitude_stretch
+from app.domain.said import said
 
 Floats = npt.NDArray[np.float64]
 
@@ -37,6 +38,7 @@ class BeyondProjection(ValueError):
 
     def __init__(self, detail: str, index: int) -> None:
         super().__init__(detail)
+        self.detail = detail
         self.index = index
 
 
@@ -113,8 +115,14 @@ class Plane:
         farthest = float(np.degrees(np.arccos(np.clip(up.min(), -1.0, 1.0))))
         if farthest > WIDEST + _ROUNDING:
             raise BeyondProjection(
-                f"a place is {farthest:.3f} degrees from the middle of the bounding box "
-                f"({x_0:.6g}, {y_0:.6g}); with zones all lie within {WIDEST:g} degrees",
+                said(
+                    "a place is {far:.3f} degrees from the middle of the bounding box ({x:.6g}, {y:.6g}); "
+                    "with zones all lie within {most:g} degrees",
+                    far=round(farthest, 3),
+                    x=x_0,
+                    y=y_0,
+                    most=WIDEST,
+                ),
                 int(up.argmin()),
             )
         right = cosine * np.sin(east)

@@ -28,11 +28,12 @@ from app.domain.fields import (
     Part,
     Whole,
     declared_fields,
-    written,
+    too_few,
 )
 from app.domain.geometry import distance, longitude_stretch
 from app.domain.matrices import Matrix, longest_leg
 from app.domain.problem_rules import broken_rules_between_fields
+from app.domain.said import said
 from app.domain.surroundings import Base, Material, NoFlyZone, Wind
 from app.domain.text_fields import Name, Properties, Words
 from app.domain.units import DISTANCE, SPEED, TIME, X, Y
@@ -217,7 +218,8 @@ class Target:
         """Yield the amounts of ``requested`` that are less than what is still needed."""
         for k, (asked, needed) in enumerate(zip(self.requested or (), self.loadlist, strict=False)):
             if asked < needed * (1.0 - ROUNDING):
-                yield f"/requested/{k}", f"{written(asked)} is less than the {written(needed)} still needed"
+                detail = said("{asked} is less than the {needed} still needed", asked=asked, needed=needed)
+                yield f"/requested/{k}", detail
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,7 +337,7 @@ class Problem:
     def broken_rules(self) -> Iterator[tuple[str, str]]:
         """Yield that there are no materials, whose number the first UAV says, and rules between fields."""
         if self.uavs and not self.uavs[0].loadlist:
-            yield "/uavs/0/loadlist", "0 materials; at least 1 is needed"
+            yield "/uavs/0/loadlist", too_few(0, "materials", 1)
         yield from broken_rules_between_fields(self)
 
     @property

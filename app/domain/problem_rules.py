@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
-from app.domain.fields import declared_fields, written
+from app.domain.fields import declared_fields
 from app.domain.matrix_rules import broken_rules_of_matrices
+from app.domain.said import noun, said
 from app.domain.text_fields import Words
 from app.domain.zone_rules import broken_rules_of_zones
 
@@ -40,13 +41,13 @@ def _exclusions(problem: Problem) -> Rules:
     if problem.matrices is not None:
         for name in ("no_fly_zones", "wind"):
             if getattr(problem, name):
-                yield f"/{name}", f"`{name}` and `matrices` exclude each other"
+                yield f"/{name}", said("`{one}` and `{other}` exclude each other", one=name, other="matrices")
     if objective.half_life is not None and objective.unloading == "planned":
-        yield "/objective/half_life", "`half_life` and `unloading`: planned exclude each other"
+        yield "/objective/half_life", said("`half_life` and `unloading`: planned exclude each other")
     if objective.loading == "planned" and objective.unloading != "planned":
-        yield "/objective/loading", "`loading`: planned needs `unloading`: planned"
+        yield "/objective/loading", said("`loading`: planned needs `unloading`: planned")
     if objective.change_weight > 0.0 and problem.start_plan is None:
-        detail = f"{written(objective.change_weight)} needs a `start_plan`, and there is none"
+        detail = said("{weight} needs a `start_plan`, and there is none", weight=objective.change_weight)
         yield "/objective/change_weight", detail
 
 
@@ -55,7 +56,11 @@ def _materials(problem: Problem) -> Rules:
     if problem.materials and len(problem.materials) != materials:
         yield (
             "/materials",
-            f"{len(problem.materials)} materials, but the first UAV carries {materials}",
+            said(
+                "{count} materials, but the first UAV carries {materials}",
+                count=len(problem.materials),
+                materials=materials,
+            ),
         )
         return
     if not any(uav.capacity is not None for uav in problem.uavs):
@@ -67,13 +72,15 @@ def _materials(problem: Problem) -> Rules:
         most = map(max, uav.loadlist, uav.full)
         weight = sum(each * amount for each, amount in zip(weights, most, strict=False))
         if weight > uav.capacity * (1.0 + ROUNDING_OF_WEIGHT):
-            of = (
-                "`loadlist`"
-                if uav.full == uav.loadlist
-                else "`loadlist` and `full_load`, the larger of each,"
-            )
-            weighs = "weighs" if uav.full == uav.loadlist else "weigh"
-            detail = f"{written(uav.capacity)} is less than the {written(weight)} that its {of} {weighs}"
+            figures = {"capacity": uav.capacity, "weight": weight}
+            if uav.full == uav.loadlist:
+                detail = said("{capacity} is less than the {weight} that its `loadlist` weighs", **figures)
+            else:
+                detail = said(
+                    "{capacity} is less than the {weight} that its `loadlist` and `full_load`, the larger of "
+                    "each, weigh",
+                    **figures,
+                )
             yield f"/uavs/{i}/capacity", detail
 
 
@@ -92,7 +99,9 @@ def _ids(problem: Problem) -> Rules:
             for index, ids in enumerate(ids_of_items):
                 for place, identifier in enumerate(ids or ()):
                     if identifier not in known:
-                        detail = f"{identifier!r} is no id of the {each.kind.ids_of}"
+                        detail = said(
+                            "{id!r} is no id of the {items}", id=identifier, items=noun(each.kind.ids_of)
+                        )
                         yield f"/{name}/{index}/{each.name}/{place}", detail
 
 
@@ -105,10 +114,10 @@ def _promises(problem: Problem) -> Rules:
         for place, identifier in enumerate(uav.committed):
             at = f"/uavs/{i}/committed/{place}"
             if identifier in first:
-                yield at, f"{identifier!r} is already number {first[identifier]}"
+                yield at, said("{id!r} is already number {other}", id=identifier, other=first[identifier])
             first.setdefault(identifier, place)
             if identifier in excluded:
-                yield at, f"{identifier!r} is in `excluded` too"
+                yield at, said("{id!r} is in `excluded` too", id=identifier)
 
 
 def _start_plan(problem: Problem) -> Rules:
@@ -118,11 +127,24 @@ def _start_plan(problem: Problem) -> Rules:
     if plan is None:
         return
     if not 1 <= len(plan) <= problem.max_steps:
-        yield "/start_plan", f"{len(plan)} steps, not in 1..{problem.max_steps}, which is `max_steps`"
+        yield (
+            "/start_plan",
+            said(
+                "{count} steps, not in 1..{most}, which is `max_steps`",
+                count=len(plan),
+                most=problem.max_steps,
+            ),
+        )
     for step, row in enumerate(plan):
         if len(row) != m:
-            yield f"/start_plan/{step}", f"{len(row)} actions, but there are {m} UAVs"
+            yield (
+                f"/start_plan/{step}",
+                said("{count} actions, but there are {uavs} UAVs", count=len(row), uavs=m),
+            )
             continue
         for i, action in enumerate(row):
             if not 0 <= action <= last:
-                yield f"/start_plan/{step}/{i}", f"{action} is not in 0..{last}"
+                yield (
+                    f"/start_plan/{step}/{i}",
+                    said("{value} is not in {low}..{high}", value=action, low=0, high=last),
+                )

@@ -10,6 +10,7 @@ from typing import Any
 from app.domain.errors import Violation
 from app.domain.fields import Context, Conversion, Kind
 from app.domain.identifiers import fault_of
+from app.domain.said import said
 
 
 @dataclass(frozen=True)
@@ -67,4 +68,6 @@ class Properties(Kind):
             json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode(errors="surrogatepass")
         )
         if size > self.most_bytes:
-            yield Violation(pointer, f"{size} bytes as JSON, at most {self.most_bytes}")
+            yield Violation(
+                pointer, said("{size} bytes as JSON, at most {most}", size=size, most=self.most_bytes)
+            )

@@ -18,7 +18,9 @@ from app.domain.fields import (
     Coordinate,
     Kind,
     out_of_limits,
+    too_few,
 )
+from app.domain.said import said
 from app.domain.units import X, Y
 
 FEWEST_CORNERS = 3
@@ -34,10 +36,15 @@ class Corners(Kind):
     def violations(self, pointer: str, value: Any, context: Context) -> Iterator[Violation]:
         """Yield that they are too few, and what is wrong with their coordinates."""
         if len(value) < FEWEST_CORNERS:
-            yield Violation(pointer, f"{len(value)} corners; at least {FEWEST_CORNERS} are needed")
+            yield Violation(
+                pointer,
+                said("{count} corners; at least {least} are needed", count=len(value), least=FEWEST_CORNERS),
+            )
         for index, corner in enumerate(value):
             if len(corner) != len(_AXES):
-                yield Violation(f"{pointer}/{index}", f"{len(corner)} numbers; a corner has 2, x and y")
+                yield Violation(
+                    f"{pointer}/{index}", said("{count} numbers; a corner has 2, x and y", count=len(corner))
+                )
                 continue
             for at, (axis, number) in enumerate(zip(_AXES, corner, strict=True)):
                 yield from axis.violations(f"{pointer}/{index}/{at}", number, context)
@@ -109,19 +116,23 @@ def table_of(rows: Any) -> Any:
 def _misshapen(pointer: str, rows: Any) -> Iterator[Violation]:
     """Yield the rows that are not as long as there are rows, and entries that are no numbers."""
     if not _is_sequence(rows) or not len(rows):
-        yield Violation(
-            pointer, "0 rows; at least 1 is needed" if _is_sequence(rows) else "is no list of rows"
-        )
+        none = too_few(0, "rows", 1)
+        yield Violation(pointer, none if _is_sequence(rows) else said("is no list of rows"))
         return
     for index, row in enumerate(rows):
         if not _is_sequence(row):
-            yield Violation(f"{pointer}/{index}", "is no list of numbers")
+            yield Violation(f"{pointer}/{index}", said("is no list of numbers"))
         elif len(row) != len(rows):
-            yield Violation(f"{pointer}/{index}", f"{len(row)} entries, but there are {len(rows)} rows")
+            yield Violation(
+                f"{pointer}/{index}",
+                said("{count} entries, but there are {rows} rows", count=len(row), rows=len(rows)),
+            )
         else:
             for column, entry in enumerate(row):
                 if not isinstance(entry, float | int | None):
-                    yield Violation(f"{pointer}/{index}/{column}", f"{entry!r} is no number")
+                    yield Violation(
+                        f"{pointer}/{index}/{column}", said("{entry} is no number", entry=repr(entry))
+                    )
 
 
 def _is_sequence(value: Any) -> bool:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from app.domain.fields import written
 from app.domain.plane import BeyondProjection, Plane
+from app.domain.said import Said, said
 from app.domain.world_fields import FEWEST_CORNERS
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def broken_rules_of_zones(problem: Problem) -> Rules:
     try:
         plane = Plane.around(problem.crs, points)
     except BeyondProjection as error:
-        yield places[error.index][0], str(error)
+        yield places[error.index][0], error.detail
         return
     for z, zone in enumerate(zones):
         flat = plane.flat(np.array(zone, dtype=np.float64))
@@ -78,12 +78,11 @@ def _faults(flat: Floats, corners: tuple[tuple[float, float], ...]) -> Rules:
     after = np.roll(around, -1, axis=0)
     crossing = _first_crossing(around, after, _TOUCHING * size)
     if crossing is not None:
-        one, other = (
-            f"from {_written(corners[a])} to {_written(corners[(a + 1) % len(corners)])}" for a in crossing
-        )
-        yield f"/{crossing[0]}", f"the side {one} crosses that {other}"
+        a, b, c, d = (_written(corners[(side + end) % len(corners)]) for side in crossing for end in (0, 1))
+        detail = said("the side from {a} to {b} crosses that from {c} to {d}", a=a, b=b, c=c, d=d)
+        yield f"/{crossing[0]}", detail
     elif abs(float(_cross(around, after).sum())) / 2 <= _FLAT * size**2:
-        yield "", "has no area"
+        yield "", said("has no area")
 
 
 def _first_crossing(begin: Floats, end: Floats, touching: float) -> tuple[int, int] | None:
@@ -114,5 +113,5 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _written(corner: tuple[float, float]) -> str:
-    return f"({written(corner[0])}, {written(corner[1])})"
+def _written(corner: tuple[float, float]) -> Said:
+    return said("({x}, {y})", x=corner[0], y=corner[1])

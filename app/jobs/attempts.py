@@ -13,6 +13,7 @@ from typing import Any, Literal, ParamSpec, TypeVar
 
 from sqlalchemy.exc import InterfaceError, OperationalError
 
+from app.domain.said import said
 from app.jobs.errors import INTERNAL_ERROR, describe, failure
 from app.jobs.events import JobEvents
 from app.jobs.executor import Execution, Outcome, Raised, Returned
@@ -275,7 +276,9 @@ async def complete(
     if attempt.killed_for == "stop" or (attempt.killed_for == "time" and waits):
         return await write(store.requeue, *which, progress)
     if attempt.killed_for == "time":
-        detail = f"the work did not stop within {grace_s:g} s after its time was up, and was ended"
+        detail = said(
+            "the work did not stop within {seconds} s after its time was up, and was ended", seconds=grace_s
+        )
         return await write(store.fail, *which, failure("time-limit-exceeded", detail), progress)
     _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)
     return await write(store.mark_crashed, *which, outcome.reason, progress)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.domain.errors import AllocatorError
+from app.domain.said import said, to_record
 
 
 class JobError(Exception):
@@ -28,8 +29,13 @@ class QueueFull(JobError):
 
     def __init__(self, lane: str, limit: int, retry_after_s: float) -> None:
         super().__init__(
-            f"the queue of {lane} jobs is full ({limit} waiting); "
-            f"a place is expected to be free in {retry_after_s:.0f} s"
+            said(
+                "the queue of {lane} jobs is full ({limit} waiting); a place is expected to be free in "
+                "{seconds} s",
+                lane=lane,
+                limit=limit,
+                seconds=round(retry_after_s),
+            )
         )
         self.retry_after_s = retry_after_s
 
@@ -38,14 +44,14 @@ class Draining(JobError):
     """The service is stopping, or not started: it takes no new job."""
 
     def __init__(self) -> None:
-        super().__init__("the service is stopping and takes no new jobs")
+        super().__init__(said("the service is stopping and takes no new jobs"))
 
 
 class JobNotFound(JobError):
     """No job has that id."""
 
     def __init__(self, job_id: str) -> None:
-        super().__init__(f"there is no job {job_id!r}")
+        super().__init__(said("there is no job {id!r}", id=job_id))
 
 
 class UnknownJobKind(JobError):
@@ -59,14 +65,16 @@ class InvalidCursor(JobError):
     """A page was asked for with a cursor that no page gave out."""
 
     def __init__(self, cursor: str) -> None:
-        super().__init__(f"{cursor!r} is not a cursor of a page of jobs")
+        super().__init__(said("{cursor!r} is not a cursor of a page of jobs", cursor=cursor))
 
 
 class IdempotencyMismatch(JobError):
     """An idempotency key was used before with another body."""
 
     def __init__(self, key: str, begun: str) -> None:
-        super().__init__(f"idempotency key {key!r} was used with another body, for {begun}")
+        super().__init__(
+            said("idempotency key {key!r} was used with another body, for {begun}", key=key, begun=begun)
+        )
 
 
 INTERNAL_ERROR = "internal-error"
@@ -75,7 +83,7 @@ INTERNAL_ERROR = "internal-error"
 
 def failure(code: str, detail: str) -> dict[str, Any]:
     """Return the error object of a failure that has no violations and no further facts."""
-    return {"code": code, "detail": detail, "violations": [], "details": {}}
+    return {"code": code, **to_record(detail), "violations": [], "details": {}}
 
 
 def describe(error: BaseException) -> dict[str, Any]:
@@ -87,8 +95,9 @@ def describe(error: BaseException) -> dict[str, Any]:
     if isinstance(error, AllocatorError):
         return {
             "code": error.code,
-            "detail": error.detail,
-            "violations": [{"pointer": v.pointer, "detail": v.detail} for v in error.violations],
+            **to_record(error.detail),
+            "violations": [{"pointer": v.pointer, **to_record(v.detail)} for v in error.violations],
             "details": error.details,
         }
-    return failure(INTERNAL_ERROR, f"the work ended with {type(error).__name__}: {error}")
+    detail = said("the work ended with {kind}: {why}", kind=type(error).__name__, why=str(error))
+    return failure(INTERNAL_ERROR, detail)

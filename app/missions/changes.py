@@ -12,8 +12,9 @@ from functools import singledispatch
 from typing import Any
 
 from app.domain.errors import Violation
-from app.domain.fields import Context, written
+from app.domain.fields import Context
 from app.domain.problem import Target
+from app.domain.said import said
 from app.missions import events, reports
 from app.missions.draft import Draft
 from app.missions.errors import EventRefused
@@ -72,7 +73,9 @@ def _(event: events.UavDelayed, draft: Draft) -> None:
     i = draft.uav(event.uav_id)
     uav = draft.problem.uavs[i]
     if event.until <= draft.clock:
-        detail = f"{written(event.until)} is not after the event, which is at {written(draft.clock)}"
+        detail = said(
+            "{time} is not after the event, which is at {clock}", time=event.until, clock=draft.clock
+        )
         raise EventRefused.at("/until", detail)
     longer = max(0.0, event.until - uav.available_from)
     aloft = uav.airborne if uav.begins_on_ground else uav.airborne + longer
@@ -113,7 +116,7 @@ def _(event: events.AreasChanged, draft: Draft) -> None:
 def _(event: events.AreaCancelled, draft: Draft) -> None:
     j = draft.target(event.target_id)
     if event.target_id in draft.cancelled:
-        raise EventRefused.at("/target_id", f"{event.target_id!r} is cancelled already")
+        raise EventRefused.at("/target_id", said("{id!r} is cancelled already", id=event.target_id))
     for i in range(len(draft.routes)):
         draft.drop(i, "area_cancelled", Stop(event.target_id))
     draft.cancelled += (event.target_id,)
@@ -174,7 +177,7 @@ def _release(draft: Draft, target_id: str) -> None:
 def _require_new(items: Sequence[Any], known: Sequence[Any], at: str) -> None:
     taken = {each.id for each in known}
     violations = [
-        Violation(f"{at}/{k}/id", f"{each.id!r} is the id of another one already")
+        Violation(f"{at}/{k}/id", said("{id!r} is the id of another one already", id=each.id))
         for k, each in enumerate(items)
         if each.id in taken
     ]

@@ -9,6 +9,7 @@ from typing import Any
 from app.domain.allocation import LandingRoute
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.problem import Problem
+from app.domain.said import Said, said
 from app.missions.effects import GONE, Broken
 from app.missions.errors import EventRefused
 from app.missions.state import Done, MissionState, Stop, without_plan
@@ -65,18 +66,18 @@ class Draft:
         EventRefused
             If there is none, or it is lost.
         """
-        i = _place(self.problem.uavs, uav_id, pointer, "UAV")
+        i = _place(self.problem.uavs, uav_id, pointer, said("UAV"))
         if uav_id in self.lost:
-            raise EventRefused.at(pointer, f"{uav_id!r} is lost")
+            raise EventRefused.at(pointer, said("{id!r} is lost", id=uav_id))
         return i
 
     def target(self, target_id: str, pointer: str = "/target_id") -> int:
         """Return the place of an area, or refuse one that is not known."""
-        return _place(self.problem.targets, target_id, pointer, "area")
+        return _place(self.problem.targets, target_id, pointer, said("area"))
 
     def base(self, base_id: str) -> int:
         """Return the place of a base, or refuse one that is not known."""
-        return _place(self.problem.bases, base_id, "/base_id", "base")
+        return _place(self.problem.bases, base_id, "/base_id", said("base"))
 
     def replace_in(self, name: str, place: int, **changes: Any) -> None:
         """Change fields of an item of the problem."""
@@ -122,11 +123,14 @@ class Draft:
         self.gone += [Broken(uav_id, stop, rule, GONE[rule]) for stop in dropped]
 
 
-def _place(items: Sequence[Any], identifier: str, pointer: str, what: str) -> int:
+def _place(items: Sequence[Any], identifier: str, pointer: str, what: Said) -> int:
     for place, item in enumerate(items):
         if item.id == identifier:
             return place
-    raise EventRefused.at(pointer, f"{identifier!r} is no {what} of this mission, which has {len(items)}")
+    detail = said(
+        "{id!r} is no {what} of this mission, which has {count}", id=identifier, what=what, count=len(items)
+    )
+    raise EventRefused.at(pointer, detail)
 
 
 def _in_event(violation: Violation, pointer: Into) -> Violation:
@@ -138,5 +142,8 @@ def _in_event(violation: Violation, pointer: Into) -> Violation:
     else:
         found = pointer(name, None, f"/{rest}" if rest else "")
     if found is None:
-        return Violation("", f"{violation.pointer} of what remains: {violation.detail}")
+        return Violation(
+            "",
+            said("{pointer} of what remains: {detail}", pointer=violation.pointer, detail=violation.detail),
+        )
     return Violation(found, violation.detail)

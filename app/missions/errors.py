@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.domain.errors import AllocatorError, Violation
+from app.domain.said import from_record, noun, said
 
 
 class EventRefused(AllocatorError):
@@ -42,7 +43,7 @@ class MissionNotFound(AllocatorError):
     code = "mission-not-found"
 
     def __init__(self, mission_id: str) -> None:
-        super().__init__(f"there is no mission {mission_id!r}")
+        super().__init__(said("there is no mission {id!r}", id=mission_id))
 
 
 class EventReused(AllocatorError):
@@ -52,8 +53,19 @@ class EventReused(AllocatorError):
 
     def __init__(self, event_id: str, number: int) -> None:
         super().__init__(
-            f"event id {event_id!r} came with another event before, which is number {number}",
-            [Violation("/id", f"{event_id!r} is the id of event {number}, which is another one")],
+            said(
+                "event id {id!r} came with another event before, which is number {number}",
+                id=event_id,
+                number=number,
+            ),
+            [
+                Violation(
+                    "/id",
+                    said(
+                        "{id!r} is the id of event {number}, which is another one", id=event_id, number=number
+                    ),
+                )
+            ],
         )
 
 
@@ -61,6 +73,12 @@ class ProposalClosed(AllocatorError):
     """A proposal was accepted, refused or outdated before, or what has happened since does not fit it."""
 
     code = "proposal-closed"
+
+    @classmethod
+    def already(cls, number: int, status: str) -> ProposalClosed:
+        """Make the error of a proposal that was accepted, refused or outdated before."""
+        words = {"accepted": noun("accepted"), "refused": noun("refused"), "outdated": noun("outdated")}
+        return cls(said("proposal {number} is {status}", number=number, status=words[status]))
 
 
 class MissionBusy(AllocatorError):
@@ -76,9 +94,9 @@ KINDS: Mapping[str, type[AllocatorError]] = {kind.code: kind for kind in (EventR
 def raised_elsewhere(error: Mapping[str, Any]) -> AllocatorError:
     """Return the exception of an error object of :func:`app.jobs.errors.describe` that a worker has sent."""
     kind = KINDS.get(error["code"])
-    violations = [Violation(each["pointer"], each["detail"]) for each in error["violations"]]
+    violations = [Violation(each["pointer"], from_record(each)) for each in error["violations"]]
     if kind is not None:
-        return kind(error["detail"], violations, error["details"])
-    other = AllocatorError(error["detail"], violations, error["details"])
+        return kind(from_record(error), violations, error["details"])
+    other = AllocatorError(from_record(error), violations, error["details"])
     other.code = error["code"]  # type: ignore[misc]  # of this one object
     return other

@@ -10,6 +10,7 @@ import logging
 from collections.abc import Mapping
 from typing import Any
 
+from app.domain.said import said
 from app.jobs.errors import INTERNAL_ERROR
 from app.jobs.executor import Executor, Raised, Returned
 from app.missions.errors import MissionBusy, raised_elsewhere
@@ -45,7 +46,7 @@ class Judge:
         """
         for _ in range(_TRIES):
             if self._closed:
-                raise MissionBusy("the service is stopping")
+                raise MissionBusy(said("the service is stopping"))
             if not self._started:
                 self._started = True
                 await self._executor.start(lambda: None)
@@ -65,7 +66,7 @@ class Judge:
                     trace = {"worker_traceback": outcome.traceback}
                     _log.error("a mission could not be judged: %s", outcome.error["detail"], extra=trace)
                 raise raised_elsewhere(outcome.error)
-        raise MissionBusy("the process that works out missions does not answer; try again")
+        raise MissionBusy(said("the process that works out missions does not answer; try again"))
 
     async def close(self) -> None:
         """End the process."""

@@ -12,10 +12,10 @@ from typing import Any
 
 from app.allocation.legality import require_legal
 from app.domain.allocation import LandingRoute
-from app.domain.fields import written
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_from_record, to_record
+from app.domain.said import said
 from app.jobs.model import WorkResult
 from app.jobs.work_context import WorkContext
 from app.missions import events
@@ -88,7 +88,7 @@ def apply(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # no
     state = MissionState.from_record(payload["state"], payload["matrices"])
     event, at, positions = events.event_from_record(payload["event"]), payload["at"], payload["positions"]
     if at < state.clock:
-        detail = f"{written(at)} is in the past: the mission's clock is {written(state.clock)}"
+        detail = said("{time} is in the past: the mission's clock is {clock}", time=at, clock=state.clock)
         raise EventRefused.at("/at", detail)
     flown = fly(state, at)
     before = reward_of(flown.state.problem, Plan(flown.state.problem.start_plan or ()))
@@ -102,7 +102,12 @@ def apply(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # no
     if isinstance(event, events.ProposalAccepted) and settled.broken:
         first = settled.broken[0]
         raise ProposalClosed(
-            f"the proposal cannot be flown any more: {first.uav_id} to {first.stop.id}: {first.says}"
+            said(
+                "the proposal cannot be flown any more: {uav} to {stop}: {why}",
+                uav=first.uav_id,
+                stop=first.stop.id,
+                why=first.says,
+            )
         )
     effect = _effect(settled, flown.routes, (*flown.broken, *draft.gone), before)
     return WorkResult(
@@ -130,7 +135,7 @@ def _carried(proposal: Mapping[str, Any], state: MissionState) -> Routes:
     begun = list(since.values())
     left = carried(tuple(routes), begun) if len(routes) == len(begun) else None
     if left is None:
-        raise ProposalClosed("the proposal cannot be flown any more: UAVs have made other stops since")
+        raise ProposalClosed(said("the proposal cannot be flown any more: UAVs have made other stops since"))
     return left
 
 

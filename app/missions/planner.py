@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy.exc import InterfaceError, OperationalError
 
+from app.domain.said import said
 from app.jobs.errors import Draining, JobNotFound, QueueFull, failure
 from app.jobs.model import Idempotency, Job, JobStatus
 from app.jobs.service import JobService
@@ -182,4 +183,4 @@ def _trouble_of(job: Job) -> dict[str, Any]:
     """Return why a search has failed."""
     if job.error is not None:
         return job.error
-    return failure("job-cancelled", f"job {job.id} was cancelled")
+    return failure("job-cancelled", said("job {id} was cancelled", id=job.id))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.domain.errors import Violation
 from app.domain.fields import Context
+from app.domain.said import said
 from app.missions import events
 from app.missions.model import Head
 
@@ -44,9 +45,16 @@ class PositionCheck:
         violations = list(events.broken_rules(event, Context(self.crs, None)))
         for k, each in enumerate(event.positions):
             if each.uav_id not in self.uav_ids:
-                detail = f"{each.uav_id!r} is no UAV of this mission, which has {len(self.uav_ids)}"
+                detail = said(
+                    "{id!r} is no {what} of this mission, which has {count}",
+                    id=each.uav_id,
+                    what=said("UAV"),
+                    count=len(self.uav_ids),
+                )
                 violations.append(Violation(f"/positions/{k}/uav_id", detail))
             if each.location is not None and each.location >= self.rows:
-                detail = f"{each.location} is no row of the matrices, which have {self.rows}"
+                detail = said(
+                    "{row} is no row of the matrices, which have {rows}", row=each.location, rows=self.rows
+                )
                 violations.append(Violation(f"/positions/{k}/location", detail))
         return violations

@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 
 from app.domain.allocation import TimedStop
-from app.domain.fields import written
 from app.domain.geometry import distance
 from app.domain.problem import ROUNDING, TOLERANCE, UAV, Problem, Target
+from app.domain.said import said
 from app.domain.surroundings import Base
 from app.missions.draft import Draft
 from app.missions.effects import stop_of
@@ -133,7 +133,13 @@ def _move(draft: Draft, i: int, change_of_load: Sequence[float], planned: Sequen
         had = have - (planned[k] if planned else 0.0)
         left = had + change_by
         if left < -TOLERANCE * max(1.0, had):
-            detail = f"{written(-change_by)} of material {k + 1}, but {uav.id} had {written(had)} aboard"
+            detail = said(
+                "{amount} of material {number}, but {uav} had {had} aboard",
+                amount=-change_by,
+                number=k + 1,
+                uav=uav.id,
+                had=had,
+            )
             raise EventRefused.at(f"/delivered/{k}", detail)
         load.append(_without_rounding(max(0.0, left), max(had, uav.full[k])))
     refills = draft.problem.bases and not draft.problem.plans_loading
@@ -172,6 +178,6 @@ def _straight(problem: Problem, uav: UAV, place: Target | Base) -> float:
 
 def _time_of(given: float | None, clock: float) -> float:
     if given is not None and given > clock:
-        detail = f"{written(given)} is later than the event, which is at {written(clock)}"
+        detail = said("{time} is later than the event, which is at {clock}", time=given, clock=clock)
         raise EventRefused.at("/time", detail)
     return clock if given is None else given

@@ -12,6 +12,7 @@ from weakref import WeakValueDictionary
 
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
+from app.domain.said import said
 from app.jobs.model import Idempotency
 from app.jobs.service import JobService
 from app.missions import events
@@ -210,7 +211,7 @@ class MissionService:
                 if new:
                     self._streams.tell(mission_id, entry)
                 return entry, new
-        raise MissionBusy(f"mission {mission_id!r} is changed by others all the time; try again")
+        raise MissionBusy(said("mission {id!r} is changed by others all the time; try again", id=mission_id))
 
     async def _known(self, mission_id: str, event_id: str, digest: str | None) -> Entry | None:
         known = await asyncio.to_thread(self.store.known, mission_id, event_id)
@@ -291,10 +292,10 @@ class MissionService:
             return None
         proposal = await asyncio.to_thread(self.store.proposal, mission_id, event.proposal)
         if proposal is None:
-            detail = f"{event.proposal} is no number of a proposal of this mission"
+            detail = said("{number} is no number of a proposal of this mission", number=event.proposal)
             raise EventRefused.at("/proposal", detail)
         if proposal.status is not ProposalStatus.OPEN:
-            raise ProposalClosed(f"proposal {event.proposal} is {proposal.status}")
+            raise ProposalClosed.already(event.proposal, proposal.status.value)
         return proposal
 
     async def _accept(self, mission_id: str) -> None:

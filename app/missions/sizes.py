@@ -5,8 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from app.domain.said import noun, said
 from app.missions import events
 from app.missions.errors import EventRefused
+
+_CALLED = {
+    "uavs": noun("UAVs"),
+    "targets": noun("targets"),
+    "no_fly_zones": noun("no-fly zones"),
+    "zone_corners": noun("corners of no-fly zones"),
+}
+"""What is counted."""
 
 
 def require_sizes(problem: Mapping[str, Any], event: events.Event, largest: Mapping[str, int]) -> None:
@@ -37,6 +46,10 @@ def require_sizes(problem: Mapping[str, Any], event: events.Event, largest: Mapp
     for name, size in added.items():
         if size > largest[name]:
             pointer = "/no_fly_zones" if name == "zone_corners" else f"/{name}"
-            what = name.replace("_", " ")
-            detail = f"{size} {what} with those there are, at most {largest[name]} are taken"
+            detail = said(
+                "{count} {items} with those there are, at most {most} are taken",
+                count=size,
+                items=_CALLED[name],
+                most=largest[name],
+            )
             raise EventRefused.at(pointer, detail)

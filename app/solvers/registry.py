@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from app.domain.errors import InvalidParameters, UnknownAlgorithm, Violation
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.domain.world_use import require_unused, used_fields
 from app.field_errors import in_words
 from app.solvers.protocol import STORED, Parameters, Solver, SolverContext
@@ -226,7 +227,7 @@ def algorithm(name: str) -> Algorithm:
     found = ALGORITHMS.get(name)
     if found is None:
         names = list(ALGORITHMS)
-        detail = f"no algorithm is called {name!r}; there are {', '.join(names)}"
+        detail = said("no algorithm is called {name!r}; there are {names}", name=name, names=names)
         raise UnknownAlgorithm(detail, [Violation("/algorithm", detail)], {"algorithms": names})
     return found
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.domain.errors import InvalidParameters, Violation
+from app.domain.said import said
 
 
 def seed_sequence(seed: int, *purpose: int) -> np.random.SeedSequence:
@@ -24,6 +25,6 @@ def seed_sequence(seed: int, *purpose: int) -> np.random.SeedSequence:
         If the seed is negative.
     """
     if seed < 0:
-        detail = f"a seed is 0 or more, not {seed}"
+        detail = said("a seed is 0 or more, not {seed}", seed=seed)
         raise InvalidParameters(detail, [Violation("/seed", detail)])
     return np.random.SeedSequence([seed, *purpose])

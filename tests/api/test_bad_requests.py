@@ -267,7 +267,8 @@ def test_problem_over_the_limits(client, m, n, k, pointer, says):
 
     refused = refusal(client.post("/allocate", json=body), 422, "problem-too-large")
 
-    assert refused["errors"] == [{"pointer": pointer, "detail": refused["detail"]}]
+    says_the_same = {name: refused[name] for name in ("detail", "sentence", "values")}
+    assert refused["errors"] == [{"pointer": pointer, **says_the_same}]
     assert says in refused["detail"]
 
 

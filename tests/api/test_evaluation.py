@@ -75,7 +75,8 @@ def test_a_plan_to_start_from_is_a_floor_and_has_to_be_legal(client):
 def test_rows_have_an_action_a_uav(client):
     answer = client.post("/evaluate", json={**PROBLEM, "assignment": [[0]]})
     assert answer.status_code == 422
-    assert answer.json()["errors"] == [{"pointer": "/assignment/0", "detail": "1 actions for 2 UAVs"}]
+    (error,) = answer.json()["errors"]
+    assert (error["pointer"], error["detail"]) == ("/assignment/0", "1 actions, but there are 2 UAVs")
 
 
 def test_an_evaluated_plan_can_be_taken_along(client):

@@ -5,6 +5,7 @@ import json
 
 import httpx
 import pytest
+from picture_archive import archive, picture
 from starlette.testclient import TestClient
 
 from app.api.application import create_application
@@ -70,6 +71,44 @@ def test_the_overlay_needs_a_key_where_others_do(tmp_path, asking):
     none = asking(no_keys=True)
     assert none.get("/dashboard/settings.json").json()["overlay"] is None
     assert none.get("/overlay.geojson").status_code == httpx.codes.NOT_FOUND
+
+
+WORLD = archive(picture(200, 0, 0), 2)
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (WORLD[:100], "has 100 bytes, and the header alone of PMTiles has 127"),
+        (WORLD[:7] + b"\x02" + WORLD[8:], "PMTiles of version 2"),
+        (
+            archive(b"vectors", 2, tile_type=1),
+            "tiles of type 1, which are no pictures: PNG, JPEG, WebP, AVIF",
+        ),
+        (WORLD[:-1], "it is not complete"),
+    ],
+)
+def test_tiles_that_cannot_be_shown_are_refused_with_the_setting_and_the_reason(
+    tmp_path, asking, content, why
+):
+    path = tmp_path / "o.pmtiles"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"ALLOCATOR_OVERLAY_FILE .*o\.pmtiles") as refused:
+        asking(overlay_file=path)
+    assert why in str(refused.value)
+
+
+def test_of_tiles_the_parts_are_sent_that_are_asked_for(tmp_path, asking):
+    path = tmp_path / "o.anything"
+    path.write_bytes(WORLD)
+    client = asking(overlay_file=path, no_keys=True)
+    assert client.get("/dashboard/settings.json").json()["overlay"] == "overlay.pmtiles"
+    answer = client.get("/overlay.pmtiles", headers={"Range": "bytes=7-12"})
+    assert answer.status_code == httpx.codes.PARTIAL_CONTENT
+    assert answer.content == WORLD[7:13]
+    assert "content-encoding" not in answer.headers
+    assert answer.headers["etag"]
+    assert client.get("/overlay.geojson").status_code == httpx.codes.NOT_FOUND
 
 
 def test_land_is_sent_as_it_lies_compressed_and_is_kept_by_browsers(asking):

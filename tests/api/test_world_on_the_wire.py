@@ -85,7 +85,7 @@ def test_what_is_null_or_empty_is_not_there():
     ("fields", "pointer", "said"),
     [
         (with_uav(reserve=1), "/uavs/0/reserve", "is 1, must be less than 1"),
-        (with_uav(endurance=0), "/uavs/0/endurance", "must be at least 1e-100"),
+        (with_uav(endurance=0), "/uavs/0/endurance", "is 0, must be more than 0"),
         (with_uav(skills=["a", 1]), "/uavs/0/skills/1", "needs a text"),
         (with_uav(location=0.5), "/uavs/0/location", "needs a whole number"),
         (with_uav(properties=[]), "/uavs/0/properties", "needs an object"),

@@ -157,7 +157,7 @@ def test_a_refusal_names_the_field_the_value_and_the_limit(client, problem):
     error = caught.value
     assert (error.status, error.type) == (422, "invalid-request")
     assert error.errors[0]["pointer"] == "/uavs/0/speed"
-    assert "/uavs/0/speed: is -5, must be at least" in str(error)
+    assert "/uavs/0/speed: is -5, must be more than 0" in str(error)
     assert re.fullmatch("[0-9a-f]{32}", error.request_id)
 
 

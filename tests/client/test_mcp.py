@@ -146,7 +146,7 @@ def test_the_limits_are_the_services(session):
             wrong = {**problem, "uavs": [{**problem["uavs"][0], "speed": -5}]}
             refused = await client.call_tool("allocate", {"request": wrong})
             assert refused.is_error
-            assert "422 invalid-request: /uavs/0/speed: is -5, must be at least" in refused.content[0].text
+            assert "422 invalid-request: /uavs/0/speed: is -5, must be more than 0" in refused.content[0].text
             many = [{**each, "id": None} for each in problem["uavs"]] * 11
             refused = await client.call_tool("allocate", {"request": {**problem, "uavs": many}})
             assert "problem-too-large: 55 UAVs, at most 50 are taken" in refused.content[0].text

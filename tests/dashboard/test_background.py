@@ -1,10 +1,12 @@
 """What lies below a problem on the globe: land where there is land, and what the operator puts above it."""
 
 import json
+from contextlib import contextmanager
 
 import pytest
 from dashboard_steps import PATIENCE_MS, open_problem, ready, state
 from live_service import SMALL, LiveService
+from picture_archive import archive, picture
 from playwright.sync_api import expect
 
 ON_LAND = """() => {
@@ -131,16 +133,22 @@ OVERLAY = {
 }
 
 
-@pytest.fixture(scope="module")
-def with_overlay(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("overlay")
-    path = folder / "borders.geojson"
-    path.write_text(json.dumps(OVERLAY), "utf-8")
+@contextmanager
+def service_with(folder, name, overlay):
+    path = folder / name
+    path.write_bytes(overlay)
     service = LiveService(folder, workers=1, **SMALL, overlay_file=path)
     try:
         yield service.start().await_alive()
     finally:
         service.stop()
+
+
+@pytest.fixture(scope="module")
+def with_overlay(tmp_path_factory):
+    content = json.dumps(OVERLAY).encode()
+    with service_with(tmp_path_factory.mktemp("overlay"), "borders.geojson", content) as service:
+        yield service
 
 
 def test_an_overlay_is_drawn_above_the_land_and_takes_no_click(browser, with_overlay):
@@ -164,3 +172,39 @@ def test_an_overlay_is_drawn_above_the_land_and_takes_no_click(browser, with_ove
     placed = state(page, "problem")["targets"][-1]
     assert [placed["x"], placed["y"]] == pytest.approx([33.2, -18.6], abs=0.02)
     context.close()
+
+
+SHOWN = """() => {
+    const [tile] = document.querySelectorAll(".leaflet-operator-pane img.leaflet-tile-loaded");
+    const canvas = new OffscreenCanvas(1, 1).getContext("2d");
+    canvas.drawImage(tile, 0, 0);
+    return [...canvas.getImageData(0, 0, 1, 1).data];
+}"""
+
+
+def test_pictures_of_an_archive_are_an_overlay_above_the_land(browser, tmp_path):
+    content = archive(picture(200, 90, 30), 3, attribution='<a href="x">The <b>mappers</b></a>')
+    with service_with(tmp_path, "world.pmtiles", content) as service, browser.new_context() as context:
+        context.set_default_timeout(PATIENCE_MS)
+        page = context.new_page()
+        troubles = []
+        page.on("console", lambda said: troubles.append(said.text) if said.type == "error" else None)
+        page.goto(service.url)
+        ready(page)
+        tiles = page.locator(".leaflet-operator-pane img.leaflet-tile-loaded")
+        expect(tiles).not_to_have_count(0)
+        assert page.evaluate(SHOWN) == [200, 90, 30, 255]
+        expect(page.locator(".leaflet-control-attribution")).to_contain_text("The mappers")
+        order = page.evaluate(
+            """() => ["land", "operator", "overlay"].map(
+                (name) => Number(getComputedStyle(document.querySelector(`.leaflet-${name}-pane`)).zIndex))"""
+        )
+        assert order == sorted(set(order))
+        page.click("[data-place=targets]")
+        box = page.locator("#map").bounding_box()
+        page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        assert "x" in state(page, "problem")["targets"][-1]
+        open_problem(page, {**problem_at({"a": (34.0, -19.2)}), "crs": "local"})
+        expect(tiles).to_have_count(0)
+        # The service says that its workers are still starting.
+        assert [text for text in troubles if "503" not in text] == []

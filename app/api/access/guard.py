@@ -22,6 +22,7 @@ from app.api.access.hosts import Hosts
 from app.api.access.keys import ApiKey, KeyStore, Role, recognise
 from app.api.problem_details import problem_response, responses
 from app.api.problem_types import ERROR_PAGE
+from app.domain.said import said
 
 OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", ERROR_PAGE, "/openapi.json", "/favicon.ico"})
 """What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""
@@ -124,7 +125,7 @@ class Guard:
         if (is_open or self._hosts.were_named) and not self._hosts.may_be(Headers(scope=scope).get("host")):
             refusal = problem_response(
                 "host-not-allowed",
-                "the header Host has no name of this service; ALLOCATOR_ALLOWED_HOSTS adds names",
+                said("the header Host has no name of this service; ALLOCATOR_ALLOWED_HOSTS adds names"),
                 scope["path"],
             )
             await refusal(scope, receive, send)
@@ -136,21 +137,26 @@ class Guard:
         if scheme.lower() != "bearer":
             refusal = problem_response(
                 "unauthenticated",
-                "this service needs an API key: Authorization: Bearer …",
+                said("this service needs an API key: Authorization: Bearer …"),
                 scope["path"],
                 headers={"WWW-Authenticate": _REALM},
             )
         elif (key := recognise(token.strip(), keys)) is None:
             refusal = problem_response(
                 "unauthenticated",
-                "this API key is unknown, or was revoked",
+                said("this API key is unknown, or was revoked"),
                 scope["path"],
                 headers={"WWW-Authenticate": f'{_REALM}, error="invalid_token"'},
             )
         elif not key.role.allows(role):
             refusal = problem_response(
                 "forbidden",
-                f"this needs a key of the role {role}, key {key.id} has the role {key.role}",
+                said(
+                    "this needs a key of the role {role}, key {id} has the role {has}",
+                    role=str(role),
+                    id=key.id,
+                    has=str(key.role),
+                ),
                 scope["path"],
                 headers={"WWW-Authenticate": f'{_REALM}, error="insufficient_scope", scope="{role}"'},
             )

@@ -21,6 +21,7 @@ from app.api.plan_formats.mission import MAX_ALTITUDE_M, MIN_ALTITUDE_M, Altitud
 from app.api.problem_details import FieldError
 from app.domain.geometry import EARTH_RADIUS_KM
 from app.domain.plane import BeyondProjection, Plane
+from app.domain.said import said
 
 TERRAIN_BEYOND_KM = 5.0
 """Length of a flight above which its altitudes are above the ground below, unless something else is asked."""
@@ -250,7 +251,7 @@ def _near(legs: Sequence[_Leg], clearance_m: float) -> list[list[int]]:
         plane = Plane.around("wgs84", points)
         flat = plane.flat(points)
     except BeyondProjection as error:
-        detail = f"legs are kept apart within a part of the globe only: {error}"
+        detail = said("legs are kept apart within a part of the globe only: {why}", why=error.detail)
         raise OutOfRange([FieldError(pointer="/routes", detail=detail, parameter="altitude_by")]) from None
     ends = np.cumsum([len(leg.way) for leg in legs])[:-1]
     lines = [
@@ -272,16 +273,26 @@ def _unknown(legs: Mapping[str, Sequence[_Leg]], separation: Separation) -> Iter
     for name in separation.altitude_of_leg:
         there = len(legs.get(name.uav_id, ()))
         if name.number > there:
-            detail = f"{name.uav_id!r} has {there} legs in this plan, none of number {name.number}"
+            detail = said(
+                "{uav!r} has {count} legs in this plan, none of number {number}",
+                uav=name.uav_id,
+                count=there,
+                number=name.number,
+            )
             yield FieldError(pointer="", detail=detail, parameter="altitude_of")
 
 
 def _beyond(
     routes: Sequence[FlownRoute], legs: Mapping[str, Sequence[_Leg]], given: Mapping[LegOf, float]
 ) -> Iterator[FieldError]:
-    limits = f"{MIN_ALTITUDE_M:g}..{MAX_ALTITUDE_M:g}"
     for route in routes:
         for altitude in dict.fromkeys(given[leg.name] for leg in legs[route.uav.id]):
             if not MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M:
-                detail = f"{route.uav.id!r} would fly at {altitude:g} m, which is not in {limits}"
+                detail = said(
+                    "{uav!r} would fly at {altitude:g} m, which is not in {low:g}..{high:g}",
+                    uav=route.uav.id,
+                    altitude=altitude,
+                    low=MIN_ALTITUDE_M,
+                    high=MAX_ALTITUDE_M,
+                )
                 yield FieldError(pointer=f"/routes/{route.number}", detail=detail)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 from app.api.errors import RequestError
 from app.api.problem_details import FieldError
+from app.domain.said import said
 
 
 class PlanUnavailable(RequestError):
@@ -27,7 +28,12 @@ class NoPlan(PlanUnavailable):
     def __init__(self, job_id: str, kind: str, status: str) -> None:
         super().__init__(
             "no-plan",
-            f"job {job_id} ({kind}, {status}) has no plan to take away; an allocation has, once it ended",
+            said(
+                "job {id} ({kind}, {status}) has no plan to take away; an allocation has, once it ended",
+                id=job_id,
+                kind=kind,
+                status=status,
+            ),
             extensions={"job_id": job_id, "job_status": status},
         )
 
@@ -38,8 +44,16 @@ class NotGeographic(PlanUnavailable):
     def __init__(self, format: str, crs: str) -> None:
         super().__init__(
             "plan-not-geographic",
-            f"format {format!r} needs a problem with crs 'wgs84'; the crs of this one is {crs!r}",
-            errors=[FieldError(pointer="/crs", detail=f"{crs!r}; {format!r} needs 'wgs84'")],
+            said(
+                "format {format!r} needs a problem with crs 'wgs84'; the crs of this one is {crs!r}",
+                format=format,
+                crs=crs,
+            ),
+            errors=[
+                FieldError(
+                    pointer="/crs", detail=said("{crs!r}; {format!r} needs 'wgs84'", crs=crs, format=format)
+                )
+            ],
             extensions={"crs": crs},
         )
 
@@ -50,8 +64,12 @@ class UnknownUAV(PlanUnavailable):
     def __init__(self, uav_id: str, parameter: str = "uav") -> None:
         super().__init__(
             "uav-not-found",
-            f"{parameter}: no UAV of the plan has the id {uav_id!r}",
-            errors=[FieldError(pointer="", detail=f"{uav_id!r} is not in the plan", parameter=parameter)],
+            said("{parameter}: no UAV of the plan has the id {id!r}", parameter=parameter, id=uav_id),
+            errors=[
+                FieldError(
+                    pointer="", detail=said("{id!r} is not in the plan", id=uav_id), parameter=parameter
+                )
+            ],
         )
 
 
@@ -59,8 +77,11 @@ class NothingToFly(PlanUnavailable):
     """The UAV, or every one, stays where it is."""
 
     def __init__(self, uav_id: str | None) -> None:
-        who = "no UAV flies" if uav_id is None else f"UAV {uav_id!r} does not fly"
-        super().__init__("nothing-to-fly", f"{who} in this plan")
+        if uav_id is None:
+            detail = said("no UAV flies in this plan")
+        else:
+            detail = said("UAV {id!r} does not fly in this plan", id=uav_id)
+        super().__init__("nothing-to-fly", detail)
 
 
 class OutOfRange(PlanUnavailable):

@@ -18,6 +18,7 @@ from app.api.plan_formats.errors import OutOfRange
 from app.api.plan_formats.flights import Flight, FlownReload, FlownStop, Points
 from app.api.problem_details import FieldError
 from app.domain.problem import TOLERANCE
+from app.domain.said import said
 
 MIN_ALTITUDE_M, MAX_ALTITUDE_M = 1.0, 10_000.0
 MAX_SERVO_CHANNEL = 32
@@ -310,15 +311,20 @@ def _violations(flight: Flight, choices: FlightChoices) -> Iterator[FieldError]:
     for number, stop in enumerate(flight.stops):
         at_stop = f"{at}/stops/{stop.number}"
         yield from _place_violations(at_stop, stop.target.x, stop.target.y)
-        for name, does, hold_s in (
-            ("service_time", "stay", _seconds(stop.target.service_time)),
-            ("begin_time", "wait", _seconds(flight.waiting_in_air(number))),
+        for name, hold_s in (
+            ("service_time", _seconds(stop.target.service_time)),
+            ("begin_time", _seconds(flight.waiting_in_air(number))),
         ):
             if hold_s > MAX_HOLD_S:
                 yield FieldError(
                     pointer=f"{at_stop}/{name}",
-                    detail=f"{uav.id!r} would {does} {hold_s:g} s at {stop.target.id!r}, "
-                    f"at most {MAX_HOLD_S:g} s can be told",
+                    detail=said(
+                        "{uav!r} would stay {seconds:g} s at {stop!r}, at most {most:g} s can be told",
+                        uav=uav.id,
+                        seconds=hold_s,
+                        stop=stop.target.id,
+                        most=MAX_HOLD_S,
+                    ),
                 )
         if stop.ground_speed != uav.speed:
             yield from _speed_violations(f"{at_stop}/speed", flight, stop.ground_speed / 3.6)
@@ -361,17 +367,19 @@ def _choice_violations(choices: FlightChoices) -> Iterator[FieldError]:
         ("max_descent", choices.max_descent_m, 0, MAX_DESCENT_M),
     ):
         if not low <= value <= high:
-            yield FieldError(
-                pointer="", detail=f"{name} {value:g} is not in {low:g}..{high:g}", parameter=name
+            detail = said(
+                "{name} {value:g} is not in {low:g}..{high:g}", name=name, value=value, low=low, high=high
             )
+            yield FieldError(pointer="", detail=detail, parameter=name)
 
 
 def _place_violations(at: str, x: float, y: float) -> Iterator[FieldError]:
     for name, value, limit in (("longitude", x, 180.0), ("latitude", y, 90.0)):
         if not -limit <= value <= limit:
-            yield FieldError(
-                pointer=f"{at}/{name}", detail=f"{value:g} degrees is not in {-limit:g}..{limit:g}"
+            detail = said(
+                "{value:g} degrees is not in {low:g}..{high:g}", value=value, low=-limit, high=limit
             )
+            yield FieldError(pointer=f"{at}/{name}", detail=detail)
 
 
 def _left_violations(

@@ -13,6 +13,7 @@ from app.api.allocation_models import AnswerModel
 from app.api.errors import NotReady
 from app.api.problem_details import responses
 from app.api.services import Served
+from app.domain.said import said
 
 router = APIRouter(tags=["operations"])
 
@@ -47,10 +48,15 @@ def get_readiness(services: Served) -> Readiness:
     try:
         policies, waiting = services.library.count(), services.jobs.waiting()
     except SQLAlchemyError as error:
-        raise NotReady(f"the store does not answer: {type(error).__name__}") from error
+        raise NotReady(said("the store does not answer: {why}", why=type(error).__name__)) from error
     load = services.jobs.load()
     if load.ready == 0:
-        raise NotReady(f"none of {load.capacity} workers is ready yet; the first start compiles for minutes")
+        raise NotReady(
+            said(
+                "none of {count} workers is ready yet; the first start compiles for minutes",
+                count=load.capacity,
+            )
+        )
     return Readiness(
         status="ready",
         workers_ready=load.ready,

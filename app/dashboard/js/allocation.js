@@ -4,6 +4,7 @@ import { ApiError, follow, json } from "./api.js";
 import { forgetErrors, notify } from "./dom.js";
 import { showPlan } from "./history.js";
 import { get, set } from "./state.js";
+import { saidErrors, saidOfProblem } from "./said.js";
 import { t } from "./texts.js";
 
 /** The request for the problem on screen. An objective that is the API's default is left out. */
@@ -100,9 +101,9 @@ function onProgress(problem, progress) {
 function end(problem, opened, job) {
   const { trace, startedAt } = get().job;
   const last = { t: (Date.now() - startedAt) / 1000, epoch: job.progress.epoch, reward: job.result?.reward ?? null };
-  take({ status: job.status, error: job.error?.detail, fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
-  set({ incumbent: null, violations: job.error?.errors ?? [] });
-  if (job.error && get().view !== "allocate") notify(job.error.detail, "error");
+  take({ status: job.status, error: job.error && saidOfProblem(job.error), fraction: job.progress.fraction, best_reward: last.reward ?? job.progress.best_reward, trace: last.reward === null ? trace : [...trace, last] });
+  set({ incumbent: null, violations: saidErrors(job.error?.errors) });
+  if (job.error && get().view !== "allocate") notify(saidOfProblem(job.error), "error");
   if (!job.error && !job.result) notify(t("The job was cancelled before it had a plan"));
   if (!job.result) return;
   if (get().opened === opened) showPlan(problem, job.result);

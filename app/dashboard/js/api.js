@@ -1,5 +1,6 @@
 /** The service's public API: JSON, problem details, keys, entity tags and event streams. */
 
+import { saidErrors, saidOfProblem } from "./said.js";
 import { t } from "./texts.js";
 
 const KEY = "allocator-key";
@@ -12,15 +13,16 @@ let askForKey = async () => null;
 let asking = null;
 
 /**
- * An answer that is no success; `problem` is its problem details, `violations` its errors field by field.
+ * An answer that is no success; `problem` is its problem details as the service wrote them, its message and `violations`, its
+ * errors field by field, are in the language of the page.
  * Its status is 0 where the service could not be reached.
  */
 export class ApiError extends Error {
   constructor(status, problem, retryAfter = null) {
-    super(problem.detail ?? t("the service answered {status}", { status }));
+    super(saidOfProblem(problem) ?? t("the service answered {status}", { status }));
     this.status = status;
     this.problem = problem;
-    this.violations = problem.errors ?? [];
+    this.violations = saidErrors(problem.errors);
     this.retryAfter = retryAfter;
   }
 }
@@ -68,7 +70,7 @@ export async function send(path, { method = "GET", body, headers = {}, signal } 
     });
     if (response.ok || response.status === 304) return response;
     const problem = await response.json().catch(() => ({}));
-    if (response.status === 401 && (await otherKey(key, problem.detail))) continue;
+    if (response.status === 401 && (await otherKey(key, saidOfProblem(problem)))) continue;
     throw new ApiError(response.status, problem, response.headers.get("Retry-After"));
   }
 }

@@ -3,6 +3,7 @@
 import * as L from "../vendor/leaflet/leaflet.js";
 import { Land } from "./land.js";
 import { Overlay } from "./overlay.js";
+import { OverlayTiles } from "./overlay_tiles.js";
 
 /** @param {L.Map} map of the globe @param {{tile_url: string | null, tile_attribution: string, overlay: string | null}} settings as the service tells them */
 export function addBackground(map, settings) {
@@ -13,5 +14,5 @@ export function addBackground(map, settings) {
     attribution.textContent = settings.tile_attribution;
     L.tileLayer(settings.tile_url, { attribution: attribution.innerHTML, maxZoom: 20 }).addTo(map);
   }
-  if (settings.overlay) new Overlay(settings.overlay).addTo(map);
+  if (settings.overlay) new (settings.overlay.endsWith(".pmtiles") ? OverlayTiles : Overlay)(settings.overlay).addTo(map);
 }

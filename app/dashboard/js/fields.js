@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { NO_LIMIT, TINY } from "./limits.js";
 import { resolved } from "./schema.js";
-import { plainNumber, t, writtenNumber } from "./texts.js";
+import { ofService, plainNumber, t, writtenNumber } from "./texts.js";
 
 /**
  * Fields of an object's schema.
@@ -58,12 +58,21 @@ function makeField(name, schema, { pointer, value, title = labelOf(name), globe,
   const input = inputFor(schema, given);
   input.name = name;
   input.addEventListener("change", onchange);
-  const element = labelled(title, input, { pointer, hint: [forPeople(schema.description, globe), range(schema)].filter(Boolean).join(". ") });
+  const element = labelled(title, input, { pointer, hint: [hintOf(schema, globe), range(schema)].filter(Boolean).join(". ") });
   return { name, element, read: () => valueOf(schema, input) };
 }
 
-/** A description in the API's words, where a field that is left empty is null; it has the units of both planes and the globe. */
-function forPeople(description, globe) {
+/**
+ * The description of a field in the language of the page, for people: a field that is left empty is null to the API.
+ * @param {object} schema @param {boolean} globe leave the units of a plane out
+ */
+function hintOf({ description }, globe) {
+  const english = forPeople(description, globe);
+  return ofService("fields", english) ?? english;
+}
+
+/** A description in English, which is the key of its translations. */
+export function forPeople(description, globe) {
   const said = description?.replaceAll("null:", "empty:").replaceAll("`", "");
   if (!globe) return said;
   return said?.replace(/\b(?:distance units per time unit|distance units|time units|[xy]), or (?=km\/h|km|h\b|longitude|latitude)/g, "").replaceAll("time units", "hours");

@@ -15,18 +15,18 @@ const codeOf = (tag) => tag.split("-")[0].toLowerCase();
 export async function loadLanguage() {
   const chosen = localStorage.getItem(STORE);
   const code = chosen in LANGUAGES ? chosen : (navigator.languages.map(codeOf).find((each) => each in LANGUAGES) ?? SOURCE);
-  const translations = code === SOURCE ? {} : await translationsOf(code);
+  const [translations, ofService] = code === SOURCE ? [{}, {}] : await Promise.all([translationsOf(code), translationsOf(`service/${code}`)]);
   if (!translations) return;
   // The region decides how numbers are written: that of the browser, if it has this language.
-  speak(navigator.languages.find((tag) => codeOf(tag) === code) ?? LANGUAGES[code], translations);
+  speak(navigator.languages.find((tag) => codeOf(tag) === code) ?? LANGUAGES[code], translations, ofService ?? {});
   document.documentElement.lang = code;
   translate(document.body);
 }
 
 /** @returns {Promise<object | null>} null where they cannot be read: the page stays English */
-async function translationsOf(code) {
+async function translationsOf(file) {
   try {
-    const response = await fetch(new URL(`../languages/${code}.json`, import.meta.url));
+    const response = await fetch(new URL(`../languages/${file}.json`, import.meta.url));
     if (!response.ok) throw new Error(`${response.url} answered ${response.status}`);
     return await response.json();
   } catch (error) {

@@ -9,6 +9,12 @@ import { t } from "./texts.js";
 const MOST_NAMES = 40;
 const PANE = "operator";
 
+/** The pane that an overlay is in, of whatever kind. */
+export function overlayPane(map) {
+  if (!map.getPane(PANE)) map.createPane(PANE).style.zIndex = 300;
+  return PANE;
+}
+
 let read = null;
 
 /** A Leaflet layer of what the service has at an address. */
@@ -19,7 +25,7 @@ export const Overlay = L.Layer.extend({
   },
 
   onAdd(map) {
-    if (!map.getPane(PANE)) map.createPane(PANE).style.zIndex = 300;
+    overlayPane(map);
     // It is read once, for this map and for those that come after it.
     read ??= json(this._path);
     read.then((collection) => this._map && this._show(collection)).catch((error) => {

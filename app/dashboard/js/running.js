@@ -1,6 +1,7 @@
 /** Allocations and trainings that a view starts by itself: sent as jobs, followed, and read at their end. */
 
 import { follow, json } from "./api.js";
+import { saidOfProblem } from "./said.js";
 
 /**
  * Run an allocation to its end.
@@ -25,6 +26,6 @@ export async function allocate(body, { onProgress = () => {}, signal } = {}) {
 export async function finished(id, onProgress = () => {}) {
   const began = performance.now();
   const job = await follow(id, (data) => onProgress(data, (performance.now() - began) / 1000));
-  if (job.error) throw new Error(job.error.detail);
+  if (job.error) throw new Error(saidOfProblem(job.error));
   return job;
 }

@@ -4,6 +4,7 @@
  */
 
 let texts = {};
+let service = {}; // what the service says: `errors`, `fields` and `algorithms`, each by its English text
 let plurals;
 let lists;
 let dates;
@@ -16,9 +17,11 @@ let decimal; // what stands between a number and its decimals
  * @param {string} tag of the language and its region, as `Intl` has them, such as `pt-MZ`
  * @param {Record<string, string | Record<string, string>>} translations by English text; of a text with a count a
  *   translation for each plural form
+ * @param {{errors?: Record<string, string>, fields?: Record<string, string>}} [translationsOfService] what the service says
  */
-export function speak(tag, translations) {
+export function speak(tag, translations, translationsOfService = {}) {
   texts = translations;
+  service = translationsOfService;
   locale = tag;
   plurals = new Intl.PluralRules(tag);
   lists = new Intl.ListFormat(tag, { type: "unit" });
@@ -56,8 +59,16 @@ export function tNodes(text, values) {
   return filled(texts[text] ?? text, values);
 }
 
+/**
+ * What the service says, in the language of the page. @param {"algorithms" | "errors" | "fields"} part @param {string | null | undefined} text in English
+ * @returns {string | undefined} undefined where the language has no translation
+ */
+export function ofService(part, text) {
+  return service[part]?.[text];
+}
+
 /** A text with its values, in pieces. */
-function filled(text, values) {
+export function filled(text, values) {
   const pieces = text.split(/\{(\w+)\}/).map((piece, at) => (at % 2 ? values[piece] : piece));
   return pieces.map((piece) => (typeof piece === "number" ? shown(piece) : piece)).filter((piece) => piece !== "");
 }
@@ -74,6 +85,13 @@ export function shown(value, digits = 4) {
   const most = Math.max(digits, Math.floor(Math.log10(Math.abs(value))) + 1);
   const tiny = Math.abs(value) < 1e-6 ? { notation: "scientific" } : {};
   return minus(format(`${most} ${tiny.notation}`, { maximumSignificantDigits: most, ...tiny }).format(value));
+}
+
+/** A number in all its digits. */
+export function exact(value) {
+  const size = Math.abs(value);
+  const notation = size !== 0 && (size < 1e-6 || size >= 1e15) ? "scientific" : "standard";
+  return minus(format(`exact ${notation}`, { maximumSignificantDigits: 15, notation }).format(value));
 }
 
 /** A number with so many decimals. */

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
+from app.domain.said import said
 from app.domain.world_use import later_fields
 
 _TAKEN = frozenset(
@@ -46,25 +47,31 @@ _TAKEN = frozenset(
     }
 )
 
-_NO_CLOCK = "the reward depends on the clock, which Eqs. 10 to 13 do not have"
+_NO_CLOCK = said("the reward depends on the clock, which Eqs. 10 to 13 do not have")
 _REASONS = {
-    "bases": "there is no action for a reload, and positions do not tell at which base a UAV lands",
-    "no_fly_zones": "the reward counts the way round a zone, which positions do not tell",
-    "matrices": "the reward counts legs of a table, and the positions that are observed are for display",
+    "bases": said("there is no action for a reload, and positions do not tell at which base a UAV lands"),
+    "no_fly_zones": said("the reward counts the way round a zone, which positions do not tell"),
+    "matrices": said(
+        "the reward counts legs of a table, and the positions that are observed are for display"
+    ),
     "objective.half_life": _NO_CLOCK,
     "objective.makespan_weight": _NO_CLOCK,
-    "objective.change_weight": "the reward depends on which visits of `start_plan` were made, which Eqs. 10 "
-    "to 13 do not have",
+    "objective.change_weight": said(
+        "the reward depends on which visits of `start_plan` were made, which Eqs. 10 to 13 do not have"
+    ),
 }
-_UNKNOWN = "the paper's observation (Eq. 13) and actions (section 3.2.3) have no place for it"
+_UNKNOWN = said("the paper's observation (Eq. 13) and actions (section 3.2.3) have no place for it")
 
 
 @cache
 def unobserved() -> Mapping[str, str]:
     """Return the fields that are refused, by their names, each with why and what to do instead."""
     return {
-        name: f"the paper's learners cannot take `{name.rpartition('.')[2]}`: {_REASONS.get(name, _UNKNOWN)}"
-        "; `auto` takes it"
+        name: said(
+            "the paper's learners cannot take `{field}`: {why}; `auto` takes it",
+            field=name.rpartition(".")[2],
+            why=_REASONS.get(name, _UNKNOWN),
+        )
         for name in later_fields()
         if name not in _TAKEN
     }

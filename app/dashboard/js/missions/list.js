@@ -6,12 +6,15 @@ import { Fields, showViolations } from "../fields.js";
 import { get, subscribe } from "../state.js";
 import { dateText, t } from "../texts.js";
 import { openMission } from "./feed.js";
+import { titled } from "./live_table.js";
 import { eventId } from "./outbox.js";
 
 /** Missions that others begin are seen so much later at most. */
 const LOOK_AGAIN_MS = 5000;
 /** Parameters of the algorithm are left to their defaults. */
 const LEFT_OUT = new Set(["parameters"]);
+/** Of the columns; the last one has the button that deletes. */
+const TITLES = [t("Mission"), t("Clock"), t("Begun"), ""];
 
 /** The list of missions and the form that begins one. */
 export class MissionList {
@@ -23,7 +26,7 @@ export class MissionList {
     this.element = h("div", { class: "block" }, this.form,
       h("section", { class: "card" }, h("h3", {}, t("Missions of the service")), this.says,
         h("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": t("Missions") }, h("table", { "data-testid": "missions" },
-          h("thead", {}, h("tr", {}, [t("Mission"), t("Clock"), t("Begun")].map((title, at) => h("th", { scope: "col", class: at === 1 ? "n" : null }, title)), h("td", {}))), this.body)), this.more));
+          h("thead", {}, h("tr", {}, TITLES.slice(0, -1).map((title, at) => h("th", { scope: "col", class: at === 1 ? "n" : null }, title)), h("td", {}))), this.body)), this.more));
     subscribe(["fields", "problem", "answer", "answerProblem"], () => this.#drawForm());
     this.#drawForm();
   }
@@ -70,10 +73,10 @@ export class MissionList {
       }
       await this.#load();
     };
-    return h("tr", { dataset: { mission: id } },
+    return titled(h("tr", { dataset: { mission: id } },
       h("th", { scope: "row", title: id }, h("button", { type: "button", class: "quiet", "aria-label": t("Open mission {mission}", { mission: title }), onclick: () => openMission(id) }, title), searching && h("span", { class: "chip" }, t("searching"))),
-      h("td", { class: "n" }, number(clock)), h("td", {}, h("time", { datetime: begun }, dateText(begun))),
-      h("td", {}, h("button", { type: "button", class: "quiet danger", "aria-label": t("Delete mission {mission}", { mission: title }), onclick: () => void remove() }, t("Delete"))));
+      h("td", { class: "n" }, number(clock)), h("td", { class: "wide" }, h("time", { datetime: begun }, dateText(begun))),
+      h("td", {}, h("button", { type: "button", class: "quiet danger", "aria-label": t("Delete mission {mission}", { mission: title }), onclick: () => void remove() }, t("Delete")))), TITLES);
   }
 
   #drawForm() {

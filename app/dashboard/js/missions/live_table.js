@@ -8,7 +8,7 @@ import { t } from "../texts.js";
 export class LiveTable {
   /** @param {string} name for the page's code @param {string} label @param {[string, boolean?][]} titles of the columns, and whether they have numbers */
   constructor(name, label, titles) {
-    this.columns = String(titles.length);
+    this.titles = titles.map(([title]) => title);
     this.body = h("tbody", {});
     this.count = 0;
     const head = ([title, numeric]) => h(title ? "th" : "td", { scope: title ? "col" : null, class: numeric ? "n" : null }, title);
@@ -19,9 +19,9 @@ export class LiveTable {
   /** Show rows in place of those before. @param {any[]} items @param {(item: any) => HTMLTableRowElement} row each told apart by its data */
   show(items, row) {
     const fresh = h("tbody", {});
-    const portions = new Portions(fresh, items, row, (button) => h("tr", {}, h("td", { colspan: this.columns }, button)));
+    const portions = new Portions(fresh, items, (item) => titled(row(item), this.titles), (button) => h("tr", {}, h("td", { colspan: String(this.titles.length) }, button)));
     portions.upTo(Math.min(this.portions?.count ?? 0, items.length));
-    if (!items.length) fresh.append(h("tr", {}, h("td", { colspan: this.columns, class: "hint" }, t("None."))));
+    if (!items.length) fresh.append(h("tr", {}, h("td", { colspan: String(this.titles.length), class: "hint" }, t("None."))));
     const [before, after] = [[...this.body.rows], [...fresh.rows]];
     const focus = this.#focus();
     if (before.length === after.length && before.every((old, at) => keyOf(old) === keyOf(after[at]))) {
@@ -42,6 +42,12 @@ export class LiveTable {
     const row = [...this.body.rows].find((each) => keyOf(each) === key);
     (row?.querySelectorAll("button")[at] ?? this.element).focus({ preventScroll: true });
   }
+}
+
+/** A row whose cells know their titles: where there is no room for columns, `mission.css` has a line for each, its title first. */
+export function titled(row, titles) {
+  [...row.cells].forEach((cell, at) => { cell.dataset.title = titles[at]; });
+  return row;
 }
 
 function keyOf({ dataset: { exact: _, ...names } }) {

@@ -3,6 +3,7 @@
 import { h, notify, number } from "../dom.js";
 import { amountsCell } from "../materials.js";
 import { baseName, names } from "../plan.js";
+import { saidOfProblem } from "../said.js";
 import { get } from "../state.js";
 import { t, tn, tNodes } from "../texts.js";
 import { brought } from "./doing.js";
@@ -91,7 +92,7 @@ function head(titles) {
 }
 
 function saysOf({ searching, trouble, planning }, proposals) {
-  if (trouble) return t("The newest search failed: {why}. The plan in force stays.", { why: trouble.detail });
+  if (trouble) return t("The newest search failed: {why}. The plan in force stays.", { why: saidOfProblem(trouble) });
   if (searching) return t("{algorithm} looks for a better plan.", { algorithm: planning.algorithm });
   if (proposals.some(({ status }) => status === "open")) return t("A better plan was found.");
   return planning.plans === "automatic" ? t("Better plans take effect by themselves.") : t("No better plan is known.");

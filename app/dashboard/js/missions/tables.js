@@ -76,7 +76,7 @@ function areas(chosen) {
     table.show(state.problem.targets, (target) =>
       h("tr", { class: cancelled.has(target.id) ? "lost" : null, dataset: { area: target.id } }, nameCell("targets", target, chosen), h("td", { class: "n" }, number(target.level)),
         h("td", { class: "n wide" }, target.requested ? tNodes("{amounts} of {asked}", { amounts: amountsCell(state.problem, target.loadlist), asked: h("span", { class: "hint" }, amountsText(state.problem, target.requested)) }).flat() : amountsCell(state.problem, target.loadlist)),
-        h("td", { class: "n" }, cancelled.has(target.id) ? t("cancelled") : coming.has(target.id) ? amountsCell(state.problem, coming.get(target.id)) : "–")));
+        h("td", { class: "n wide" }, cancelled.has(target.id) ? t("cancelled") : coming.has(target.id) ? amountsCell(state.problem, coming.get(target.id)) : "–")));
   };
   return { title: t("Areas"), open: false, table, draw };
 }
@@ -85,7 +85,7 @@ function areas(chosen) {
 function bases(chosen) {
   const table = new LiveTable("bases", t("Bases"), [[t("Base")], [t("Stock"), true], [t("Turnaround"), true]]);
   const draw = ({ state: { problem } }) => table.show(problem[BASES] ?? [], (base) =>
-    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base, chosen), h("td", { class: "n" }, stockText(problem, base.stock)), h("td", { class: "n" }, durationText(problem, base.turnaround ?? 0))));
+    h("tr", { dataset: { base: base.id } }, nameCell(BASES, base, chosen), h("td", { class: "n wide" }, stockText(problem, base.stock)), h("td", { class: "n" }, durationText(problem, base.turnaround ?? 0))));
   return { title: t("Bases"), open: false, table, draw };
 }
 

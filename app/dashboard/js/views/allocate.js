@@ -8,7 +8,7 @@ import { wayTo } from "../faults.js";
 import { Fields, labelled, showViolations } from "../fields.js";
 import { registerView } from "../registry.js";
 import { get, set, subscribe } from "../state.js";
-import { t } from "../texts.js";
+import { ofService, t } from "../texts.js";
 import { crossingNotes } from "../zone_form.js";
 
 /** The field that asks to keep what is learned: only some algorithms learn. */
@@ -46,7 +46,7 @@ function makeForm() {
   let parameters;
   const choose = () => {
     const algorithm = algorithms.find(({ name }) => name === choice.value);
-    summary.textContent = algorithm.summary;
+    summary.textContent = ofService("algorithms", algorithm.summary) ?? algorithm.summary;
     parameters = new Fields(algorithm.parameters.properties ?? {}, { pointer: "/parameters", defs: algorithm.parameters.$defs });
     place.replaceChildren(parameters.element);
     keeping.element.hidden = !learns();

@@ -9,7 +9,7 @@ import { allocate } from "../running.js";
 import { uavCount } from "../sizes.js";
 import { get, subscribe } from "../state.js";
 import { taskPicture } from "../task_picture.js";
-import { fixed, t, tn, tNodes } from "../texts.js";
+import { fixed, ofService, t, tn, tNodes } from "../texts.js";
 
 const PREFERRED = ["auto", "transfer_qmix", "local_search", "ga", "greedy"];
 
@@ -58,9 +58,11 @@ function choices() {
   const before = new Set([...parts.choices.querySelectorAll("input:checked")].map((box) => box.value));
   const wanted = before.size ? before : new Set(PREFERRED.filter((name) => algorithms.some((a) => a.name === name)));
   parts.choices.replaceChildren(
-    ...algorithms.map(({ name, summary, comparison }) =>
-      h("label", { class: "chip", title: comparison ? t("For comparison: {summary}", { summary }) : summary },
-        h("input", { type: "checkbox", name: "algorithm", value: name, checked: wanted.has(name) }), " ", name)));
+    ...algorithms.map(({ name, summary: english, comparison }) => {
+      const summary = ofService("algorithms", english) ?? english;
+      return h("label", { class: "chip", title: comparison ? t("For comparison: {summary}", { summary }) : summary },
+        h("input", { type: "checkbox", name: "algorithm", value: name, checked: wanted.has(name) }), " ", name);
+    }));
 }
 
 async function run() {

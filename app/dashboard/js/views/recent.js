@@ -9,6 +9,7 @@ import { openPlan, recentPlans } from "../recent.js";
 import { registerView } from "../registry.js";
 import { sizeText } from "../sizes.js";
 import { set } from "../state.js";
+import { saidOfProblem } from "../said.js";
 import { dateText, t } from "../texts.js";
 
 let parts = null;
@@ -62,7 +63,7 @@ function planRow(job) {
     h("td", {}, failed ? "–" : h("button", { type: "button", "aria-label": t("Open plan {plan}", { plan: job.id.slice(0, 8) }), onclick: open }, t("Open"))),
     h("td", {}, h("time", { datetime: job.created_at }, dateText(job.created_at))),
     h("td", { title: job.id }, job.id.slice(0, 8)),
-    h("td", {}, h("span", { class: "chip", title: job.error?.detail }, statusName(job.status))),
+    h("td", {}, h("span", { class: "chip", title: job.error && saidOfProblem(job.error) }, statusName(job.status))),
     h("td", {}, number(job.progress.best_reward)));
 }
 
