@@ -22,7 +22,7 @@ _LONGEST_COMBINED = 10.0
 _LEAST_VISITS = 30
 """Visits, at least, by which such a round is measured."""
 
-_MOST = 4_300_000
+_MOST = 8_600_000
 """Bound of the moves times what one costs; about 2 s."""
 
 
@@ -32,7 +32,7 @@ _LARGE_SHARE = 0.5
 _LARGE_COST, _LARGE_COST_A_STOP = 3.0, 0.6
 """What a large move costs, in small ones, and for each stop of a route."""
 
-_SPEED = 3e6
+_SPEED = 6e6
 """Moves a second times what one costs, on a core of 2024."""
 
 _PATIENCE = 25
