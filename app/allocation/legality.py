@@ -9,9 +9,7 @@ from app.domain.errors import IllegalPlan, Violation
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.simulation.amounts import Amounts
-from app.simulation.arrays import compile_problem
 from app.simulation.breaches import Breach, breaches_of
-from app.simulation.evaluation import replayed
 
 
 def require_legal(problem: Problem, plan: Plan, pointer: str, amounts: Amounts | None = None) -> None:
@@ -30,12 +28,9 @@ def require_legal(problem: Problem, plan: Plan, pointer: str, amounts: Amounts |
     ------
     IllegalPlan
         With a violation for every action that breaks a rule, and the figures in ``details["breaches"]``.
-        Where unloading is planned, with the first one.
+        Where unloading is planned, and no rule but that of amounts is broken, with the first one.
     """
-    if problem.plans_unloading:
-        replayed(problem, compile_problem(problem), plan.as_array(), amounts)
-        return
-    breaches = breaches_of(problem, plan)
+    breaches = breaches_of(problem, plan, amounts)
     if not breaches:
         return
     place = {uav.id: f"/{i}" for i, uav in enumerate(problem.uavs)}

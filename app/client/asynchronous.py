@@ -6,7 +6,6 @@ import json
 from collections.abc import AsyncGenerator, Iterable, Mapping
 from contextlib import aclosing
 from typing import Any, Self, Unpack, cast
-from urllib.parse import quote
 
 import httpx
 
@@ -14,7 +13,7 @@ from . import types
 from .asynchronous_connection import AsyncConnection
 from .errors import JobCancelled, JobFailed, StreamCutOff
 from .event_stream import StreamEvent
-from .exchange import Call, File, file_of
+from .exchange import Call, File, file_of, one_part
 
 TIMEOUT_S = 60.0
 RETRY_S = 30.0
@@ -175,7 +174,7 @@ class AsyncClient:
 
     async def example(self, name: str) -> types.AllocationRequest:
         """Return an example problem."""
-        return cast(types.AllocationRequest, await self._get(f"/examples/{quote(name, safe='')}"))
+        return cast(types.AllocationRequest, await self._get(f"/examples/{one_part(name)}"))
 
     # Jobs
 
@@ -187,7 +186,7 @@ class AsyncClient:
 
     async def job(self, job_id: str) -> types.Job:
         """Return a job as it is now."""
-        return cast(types.Job, await self._get(f"/jobs/{job_id}"))
+        return cast(types.Job, await self._get(f"/jobs/{one_part(job_id)}"))
 
     async def follow(self, job_id: str, after: str | None = None) -> AsyncGenerator[StreamEvent]:
         """Yield the progress of a job until its end: events ``progress``, and one ``end``.
@@ -199,7 +198,9 @@ class AsyncClient:
         after
             Id of the last event that is known already.
         """
-        async with aclosing(self._connection.events(f"/jobs/{job_id}/events", "end", after)) as events:
+        async with aclosing(
+            self._connection.events(f"/jobs/{one_part(job_id)}/events", "end", after)
+        ) as events:
             async for event in events:
                 yield event
 
@@ -227,18 +228,18 @@ class AsyncClient:
 
     async def cancel(self, job_id: str) -> types.Job:
         """Cancel a job. One that runs stops soon, and the best plan so far becomes its result."""
-        call = Call("DELETE", f"/jobs/{job_id}", repeatable=True)
+        call = Call("DELETE", f"/jobs/{one_part(job_id)}", repeatable=True)
         return cast(types.Job, (await self._connection.send(call)).json())
 
     async def problem_of(self, job_id: str) -> types.Problem:
         """Return the problem that a job was given."""
-        return cast(types.Problem, await self._get(f"/jobs/{job_id}/problem"))
+        return cast(types.Problem, await self._get(f"/jobs/{one_part(job_id)}/problem"))
 
     async def export(
         self, job_id: str, format: types.PlanFormat, **choices: Unpack[types.PlanChoices]
     ) -> File:
         """Return the plan of an allocation as a file; several flight files come as a ZIP archive."""
-        call = Call("GET", f"/jobs/{job_id}/plan", {"format": format, **choices}, repeatable=True)
+        call = Call("GET", f"/jobs/{one_part(job_id)}/plan", {"format": format, **choices}, repeatable=True)
         return file_of(await self._connection.send(call))
 
     # Missions
@@ -278,53 +279,55 @@ class AsyncClient:
 
     async def mission(self, mission_id: str) -> types.MissionAsItStands:
         """Return a mission as it stands."""
-        return cast(types.MissionAsItStands, await self._get(f"/missions/{mission_id}"))
+        return cast(types.MissionAsItStands, await self._get(f"/missions/{one_part(mission_id)}"))
 
     async def tell(self, mission_id: str, event: types.Event) -> types.EventAnswer:
         """Tell what has happened; return what it did to the plan in force."""
-        call = Call("POST", f"/missions/{mission_id}/events", body=event, repeatable=True)
+        call = Call("POST", f"/missions/{one_part(mission_id)}/events", body=event, repeatable=True)
         return cast(types.EventAnswer, (await self._connection.send(call)).json())
 
     async def history(self, mission_id: str, after: int = 0) -> AsyncGenerator[types.EventAnswer]:
         """Yield what has happened, in the order in which it took effect, from after an event's number."""
         following: int | None = after
         while following is not None:
-            page = await self._get(f"/missions/{mission_id}/events", after=following)
+            page = await self._get(f"/missions/{one_part(mission_id)}/events", after=following)
             for event in page["events"]:
                 yield event
             following = page["next_after"]
 
     async def follow_mission(self, mission_id: str, after: str | None = None) -> AsyncGenerator[StreamEvent]:
         """Yield the history, then what happens, until the mission is deleted."""
-        async with aclosing(self._connection.events(f"/missions/{mission_id}/stream", None, after)) as events:
+        async with aclosing(
+            self._connection.events(f"/missions/{one_part(mission_id)}/stream", None, after)
+        ) as events:
             async for event in events:
                 yield event
 
     async def mission_state(self, mission_id: str, at: float | None = None) -> types.StateAtMoment:
         """Return what remains at a moment: as it was known then, or as it is planned; default: now."""
-        return cast(types.StateAtMoment, await self._get(f"/missions/{mission_id}/state", at=at))
+        return cast(types.StateAtMoment, await self._get(f"/missions/{one_part(mission_id)}/state", at=at))
 
     async def mission_plan(self, mission_id: str) -> types.PlanAnswer:
         """Return the rest of the plan in force, with its times."""
-        return cast(types.PlanAnswer, await self._get(f"/missions/{mission_id}/plan"))
+        return cast(types.PlanAnswer, await self._get(f"/missions/{one_part(mission_id)}/plan"))
 
     async def proposals(self, mission_id: str) -> list[types.Proposal]:
         """Return the plans that were proposed, newest first."""
-        found = await self._get(f"/missions/{mission_id}/proposals")
+        found = await self._get(f"/missions/{one_part(mission_id)}/proposals")
         return cast(list[types.Proposal], found["proposals"])
 
     async def differences(self, mission_id: str, before: int, after: int) -> types.Differences:
         """Return how the plans in force after two events differ, by the events' numbers."""
-        path = f"/missions/{mission_id}/differences"
+        path = f"/missions/{one_part(mission_id)}/differences"
         return cast(types.Differences, await self._get(path, before=before, after=after))
 
     async def replay(self, mission_id: str) -> types.Replay:
         """Return all that is kept of a mission."""
-        return cast(types.Replay, await self._get(f"/missions/{mission_id}/replay"))
+        return cast(types.Replay, await self._get(f"/missions/{one_part(mission_id)}/replay"))
 
     async def delete_mission(self, mission_id: str) -> None:
         """Delete a mission with its history."""
-        await self._connection.send(Call("DELETE", f"/missions/{mission_id}"))
+        await self._connection.send(Call("DELETE", f"/missions/{one_part(mission_id)}"))
 
     # The library of policies
 
@@ -350,11 +353,11 @@ class AsyncClient:
 
     async def policy(self, policy_id: str) -> types.Policy:
         """Return a source policy with its task."""
-        return cast(types.Policy, await self._get(f"/library/{quote(policy_id, safe='')}"))
+        return cast(types.Policy, await self._get(f"/library/{one_part(policy_id)}"))
 
     async def checkpoint(self, policy_id: str) -> File:
         """Return the weights of a source policy, as safetensors."""
-        path = f"/library/{quote(policy_id, safe='')}/checkpoint"
+        path = f"/library/{one_part(policy_id)}/checkpoint"
         return file_of(await self._connection.send(Call("GET", path, repeatable=True)))
 
     async def similar(
@@ -367,7 +370,7 @@ class AsyncClient:
 
     async def delete_policy(self, policy_id: str) -> None:
         """Delete a source policy."""
-        await self._connection.send(Call("DELETE", f"/library/{quote(policy_id, safe='')}"))
+        await self._connection.send(Call("DELETE", f"/library/{one_part(policy_id)}"))
 
     # The service itself
 

@@ -55,7 +55,7 @@ class AsyncConnection:
             try:
                 request = self.http.build_request(**call.arguments(self._timeout_s))
                 response = await self.http.send(request, stream=stream)
-                if response.status_code < 400:
+                if response.is_success:
                     return response
                 await response.aread()
                 failed = error_of(response)

@@ -57,7 +57,7 @@ class Connection:
             try:
                 request = self.http.build_request(**call.arguments(self._timeout_s))
                 response = self.http.send(request, stream=stream)
-                if response.status_code < 400:
+                if response.is_success:
                     return response
                 response.read()
                 failed = error_of(response)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 
@@ -17,6 +18,11 @@ _PASSING = frozenset({429, 502, 503})
 _FIRST_PAUSE_S = 0.25
 _LONGEST_PAUSE_S = 5.0
 _FILE_NAME = re.compile(r'filename="([^"]+)"')
+
+
+def one_part(identifier: str) -> str:
+    """Write an id as one part of a path, whatever it is: `..`, or one with a `/`, leads nowhere else."""
+    return quote(identifier, safe="").replace(".", "%2E")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ import json
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing
 from typing import Any, Self, Unpack, cast
-from urllib.parse import quote
 
 import httpx
 
@@ -17,7 +16,7 @@ from . import types
 from .connection import Connection
 from .errors import JobCancelled, JobFailed, StreamCutOff
 from .event_stream import StreamEvent
-from .exchange import Call, File, file_of
+from .exchange import Call, File, file_of, one_part
 
 TIMEOUT_S = 60.0
 RETRY_S = 30.0
@@ -178,7 +177,7 @@ class Client:
 
     def example(self, name: str) -> types.AllocationRequest:
         """Return an example problem."""
-        return cast(types.AllocationRequest, self._get(f"/examples/{quote(name, safe='')}"))
+        return cast(types.AllocationRequest, self._get(f"/examples/{one_part(name)}"))
 
     # Jobs
 
@@ -190,7 +189,7 @@ class Client:
 
     def job(self, job_id: str) -> types.Job:
         """Return a job as it is now."""
-        return cast(types.Job, self._get(f"/jobs/{job_id}"))
+        return cast(types.Job, self._get(f"/jobs/{one_part(job_id)}"))
 
     def follow(self, job_id: str, after: str | None = None) -> Generator[StreamEvent]:
         """Yield the progress of a job until its end: events ``progress``, and one ``end``.
@@ -202,7 +201,7 @@ class Client:
         after
             Id of the last event that is known already.
         """
-        with closing(self._connection.events(f"/jobs/{job_id}/events", "end", after)) as events:
+        with closing(self._connection.events(f"/jobs/{one_part(job_id)}/events", "end", after)) as events:
             for event in events:
                 yield event
 
@@ -230,16 +229,16 @@ class Client:
 
     def cancel(self, job_id: str) -> types.Job:
         """Cancel a job. One that runs stops soon, and the best plan so far becomes its result."""
-        call = Call("DELETE", f"/jobs/{job_id}", repeatable=True)
+        call = Call("DELETE", f"/jobs/{one_part(job_id)}", repeatable=True)
         return cast(types.Job, (self._connection.send(call)).json())
 
     def problem_of(self, job_id: str) -> types.Problem:
         """Return the problem that a job was given."""
-        return cast(types.Problem, self._get(f"/jobs/{job_id}/problem"))
+        return cast(types.Problem, self._get(f"/jobs/{one_part(job_id)}/problem"))
 
     def export(self, job_id: str, format: types.PlanFormat, **choices: Unpack[types.PlanChoices]) -> File:
         """Return the plan of an allocation as a file; several flight files come as a ZIP archive."""
-        call = Call("GET", f"/jobs/{job_id}/plan", {"format": format, **choices}, repeatable=True)
+        call = Call("GET", f"/jobs/{one_part(job_id)}/plan", {"format": format, **choices}, repeatable=True)
         return file_of(self._connection.send(call))
 
     # Missions
@@ -279,53 +278,55 @@ class Client:
 
     def mission(self, mission_id: str) -> types.MissionAsItStands:
         """Return a mission as it stands."""
-        return cast(types.MissionAsItStands, self._get(f"/missions/{mission_id}"))
+        return cast(types.MissionAsItStands, self._get(f"/missions/{one_part(mission_id)}"))
 
     def tell(self, mission_id: str, event: types.Event) -> types.EventAnswer:
         """Tell what has happened; return what it did to the plan in force."""
-        call = Call("POST", f"/missions/{mission_id}/events", body=event, repeatable=True)
+        call = Call("POST", f"/missions/{one_part(mission_id)}/events", body=event, repeatable=True)
         return cast(types.EventAnswer, (self._connection.send(call)).json())
 
     def history(self, mission_id: str, after: int = 0) -> Generator[types.EventAnswer]:
         """Yield what has happened, in the order in which it took effect, from after an event's number."""
         following: int | None = after
         while following is not None:
-            page = self._get(f"/missions/{mission_id}/events", after=following)
+            page = self._get(f"/missions/{one_part(mission_id)}/events", after=following)
             for event in page["events"]:
                 yield event
             following = page["next_after"]
 
     def follow_mission(self, mission_id: str, after: str | None = None) -> Generator[StreamEvent]:
         """Yield the history, then what happens, until the mission is deleted."""
-        with closing(self._connection.events(f"/missions/{mission_id}/stream", None, after)) as events:
+        with closing(
+            self._connection.events(f"/missions/{one_part(mission_id)}/stream", None, after)
+        ) as events:
             for event in events:
                 yield event
 
     def mission_state(self, mission_id: str, at: float | None = None) -> types.StateAtMoment:
         """Return what remains at a moment: as it was known then, or as it is planned; default: now."""
-        return cast(types.StateAtMoment, self._get(f"/missions/{mission_id}/state", at=at))
+        return cast(types.StateAtMoment, self._get(f"/missions/{one_part(mission_id)}/state", at=at))
 
     def mission_plan(self, mission_id: str) -> types.PlanAnswer:
         """Return the rest of the plan in force, with its times."""
-        return cast(types.PlanAnswer, self._get(f"/missions/{mission_id}/plan"))
+        return cast(types.PlanAnswer, self._get(f"/missions/{one_part(mission_id)}/plan"))
 
     def proposals(self, mission_id: str) -> list[types.Proposal]:
         """Return the plans that were proposed, newest first."""
-        found = self._get(f"/missions/{mission_id}/proposals")
+        found = self._get(f"/missions/{one_part(mission_id)}/proposals")
         return cast(list[types.Proposal], found["proposals"])
 
     def differences(self, mission_id: str, before: int, after: int) -> types.Differences:
         """Return how the plans in force after two events differ, by the events' numbers."""
-        path = f"/missions/{mission_id}/differences"
+        path = f"/missions/{one_part(mission_id)}/differences"
         return cast(types.Differences, self._get(path, before=before, after=after))
 
     def replay(self, mission_id: str) -> types.Replay:
         """Return all that is kept of a mission."""
-        return cast(types.Replay, self._get(f"/missions/{mission_id}/replay"))
+        return cast(types.Replay, self._get(f"/missions/{one_part(mission_id)}/replay"))
 
     def delete_mission(self, mission_id: str) -> None:
         """Delete a mission with its history."""
-        self._connection.send(Call("DELETE", f"/missions/{mission_id}"))
+        self._connection.send(Call("DELETE", f"/missions/{one_part(mission_id)}"))
 
     # The library of policies
 
@@ -351,11 +352,11 @@ class Client:
 
     def policy(self, policy_id: str) -> types.Policy:
         """Return a source policy with its task."""
-        return cast(types.Policy, self._get(f"/library/{quote(policy_id, safe='')}"))
+        return cast(types.Policy, self._get(f"/library/{one_part(policy_id)}"))
 
     def checkpoint(self, policy_id: str) -> File:
         """Return the weights of a source policy, as safetensors."""
-        path = f"/library/{quote(policy_id, safe='')}/checkpoint"
+        path = f"/library/{one_part(policy_id)}/checkpoint"
         return file_of(self._connection.send(Call("GET", path, repeatable=True)))
 
     def similar(
@@ -368,7 +369,7 @@ class Client:
 
     def delete_policy(self, policy_id: str) -> None:
         """Delete a source policy."""
-        self._connection.send(Call("DELETE", f"/library/{quote(policy_id, safe='')}"))
+        self._connection.send(Call("DELETE", f"/library/{one_part(policy_id)}"))
 
     # The service itself
 

@@ -271,9 +271,10 @@ async def complete(
             trace = {"worker_traceback": outcome.traceback}
             _log.error("a job failed: %s", outcome.error["detail"], extra=trace)
         return await write(store.fail, *which, outcome.error, progress)
-    # One whose time is up waits again, where there is an answer for those.
+    # What nothing has begun with waits again, and so does one whose time is up, where there is an answer for
+    # those.
     waits = kind.at_once is not None and not (attempt.at_once or attempt.asked_to_stop)
-    if attempt.killed_for == "stop" or (attempt.killed_for == "time" and waits):
+    if not outcome.begun or attempt.killed_for == "stop" or (attempt.killed_for == "time" and waits):
         return await write(store.requeue, *which, progress)
     if attempt.killed_for == "time":
         detail = said(

@@ -47,9 +47,18 @@ class Raised:
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The worker died, or was killed, before the work function ended."""
+    """The worker died, or was killed, before the work function ended.
+
+    Attributes
+    ----------
+    reason
+        What happened.
+    begun
+        Whether a worker had begun with it.
+    """
 
     reason: str
+    begun: bool = True
 
 
 Outcome = Returned | Raised | Lost
@@ -127,7 +136,7 @@ class Execution:
             return await asyncio.shield(self.task)
         except asyncio.CancelledError:
             if self.task.cancelled():
-                return Lost("it was stopped before a worker was free")
+                return Lost("no worker was free before it was stopped", begun=False)
             raise
 
     def cancel(self) -> None:
@@ -152,6 +161,8 @@ class Execution:
                 outcome = await worker.run(work, self._cancelled)
             finally:
                 self.worker = None
+            if outcome is None and not executor.ready:
+                outcome = Lost("the last worker was gone before it began", begun=False)
         if not isinstance(outcome, Lost):
             executor.free.put_nowait(worker)
             executor.divide()
@@ -252,6 +263,12 @@ class Executor(ABC):
             keeper.cancel()
         await asyncio.gather(*self._keepers, return_exceptions=True)
 
+    def _give_back_what_waits(self) -> None:
+        """End executions that no worker has begun with, as none is left: until one is warm takes a while."""
+        for execution in tuple(self._executions):
+            if execution.worker is None:
+                execution.kill()
+
     @abstractmethod
     def _new_worker(self) -> Worker:
         """Make a worker, which begins to start."""
@@ -287,4 +304,6 @@ class Executor(ABC):
             _log.warning("a worker is gone and is replaced", extra={"worker": worker.name})
         finally:
             self.ready -= warm
+            if warm and not self.ready:
+                self._give_back_what_waits()
             await worker.discard()

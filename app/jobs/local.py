@@ -118,7 +118,7 @@ class _Worker:
         try:
             await self._loop.run_in_executor(self._sender, self._pipe.send, call)
         except OSError:
-            return Lost("it was ended before it began") if self._doomed else None
+            return Lost("it was ended before it began", begun=False) if self._doomed else None
         except Exception as error:  # what was to be sent cannot be pickled
             return Raised(describe(error), traceback.format_exc())
         return await self._outcome

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from app.jobs.attempts import Writer
 from app.jobs.clock import Loop
-from app.jobs.executor import Execution, Executor, Raised, Returned
+from app.jobs.executor import Execution, Executor, Lost, Raised, Returned
 from app.jobs.model import Job
 from app.jobs.store import JobStore
 
@@ -185,7 +185,7 @@ class Reserve:
         if isinstance(outcome, Returned):
             if not outcome.work.unfinished:
                 await self._complete(job, outcome.work.result)
-        elif not self.completing.ended:
+        elif not (self.completing.ended or (isinstance(outcome, Lost) and not outcome.begun)):
             reason = outcome.error["detail"] if isinstance(outcome, Raised) else outcome.reason
             _log.warning("a result is not completed: %s", reason, extra={"job_id": job.id})
             await self._complete(job, kind.follow_up.given_up, failed=True)

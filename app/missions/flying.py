@@ -17,12 +17,9 @@ from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem
 from app.missions.effects import Broken, stop_of
 from app.missions.state import Done, MissionState, Routes, Stop, routes_of, with_routes, without_plan
-from app.simulation import visit
-from app.simulation.breaches import NAMES, breaches_of
+from app.simulation.breaches import breaches_of
 from app.simulation.explain import timed_routes
 from app.simulation.mid_mission import remaining_at
-
-_RULES = {says: NAMES.get(rule, "no_such_action") for rule, says in visit.RULES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,9 +171,8 @@ def settle(problem: Problem, routes: Sequence[Sequence[Stop]]) -> Settled:
         plan = Plan(tried.start_plan or ())
         try:
             return Settled(tried, timed_routes(tried, plan), tuple(broken))
-        except IllegalPlan as illegal:
-            found = _first_broken(tried, plan, illegal)
-        i, s, fault = found
+        except IllegalPlan:
+            i, s, fault = _first_broken(tried, plan)
         stop = left[i].pop(s)
         broken.append(replace(fault, stop=stop))
         uav = problem.uavs[i]
@@ -186,18 +182,12 @@ def settle(problem: Problem, routes: Sequence[Sequence[Stop]]) -> Settled:
             problem = without_plan(problem, uavs=uavs)
 
 
-def _first_broken(problem: Problem, plan: Plan, illegal: IllegalPlan) -> tuple[int, int, Broken]:
+def _first_broken(problem: Problem, plan: Plan) -> tuple[int, int, Broken]:
     """Return UAV and step of the first action that breaks a rule, and which rule that is."""
-    ids = [uav.id for uav in problem.uavs]
-    nowhere = Stop("")
-    if not problem.plans_unloading:
-        breach = breaches_of(problem, plan)[0]
-        uav_id = str(breach.uav_id)
-        fault = Broken(uav_id, nowhere, breach.rule, breach.says, breach.needed, breach.had)
-        return ids.index(uav_id), breach.step - 1, fault
-    uav_id, says = illegal.details["uav_id"], illegal.details["rule"]
-    fault = Broken(uav_id, nowhere, _RULES[says], says)
-    return ids.index(uav_id), illegal.details["step"] - 1, fault
+    breach = breaches_of(problem, plan)[0]
+    uav_id = str(breach.uav_id)
+    fault = Broken(uav_id, Stop(""), breach.rule, breach.says, breach.needed, breach.had)
+    return [uav.id for uav in problem.uavs].index(uav_id), breach.step - 1, fault
 
 
 def with_positions(problem: Problem, positions: Mapping[str, Mapping[str, Any]], at: float) -> Problem:

@@ -18,8 +18,11 @@ from app.simulation.highs import QuietHighs
 _ZERO = 1e-9
 """Amount, in parts of the largest need of a material, that a solution of the program may be off by."""
 
+_LEAST_CAPACITY = 1e-9
+"""Of the weight of the heaviest of these largest needs; a row of weights is no finer."""
 
-def amounts_by_program(arrays: ProblemArrays, actions: Integers) -> Amounts:
+
+def amounts_by_program(arrays: ProblemArrays, actions: Integers) -> Amounts | None:
     """Solve the program.
 
     Parameters
@@ -29,15 +32,17 @@ def amounts_by_program(arrays: ProblemArrays, actions: Integers) -> Amounts:
     actions
         (S', M) joint actions; ranges and deadlines do not matter here.
 
-    Raises
-    ------
-    RuntimeError
-        If HiGHS finds no optimum; there always is one.
+    Returns
+    -------
+    Amounts or None
+        None if HiGHS finds no optimum. There always is one, but amounts and weights of a request may lie
+        farther apart than its tolerances do.
     """
     if (actions == arrays.shape[1]).all():
         none = np.zeros((*actions.shape, arrays.shape[2]))
         return Amounts(none, none.copy())
-    return in_turn(arrays, actions, _Program(arrays, actions).solve())
+    wanted = _Program(arrays, actions).solve()
+    return None if wanted is None else in_turn(arrays, actions, wanted)
 
 
 def in_turn(arrays: ProblemArrays, actions: Integers, wanted: Amounts) -> Amounts:
@@ -120,8 +125,8 @@ class _Program:
         self._reloads: list[tuple[int, int, list[int]]] = []
         self._write()
 
-    def solve(self) -> Amounts:
-        """Return the amounts of an optimum."""
+    def solve(self) -> Amounts | None:
+        """Return the amounts of an optimum; None if HiGHS finds none."""
         starts = np.cumsum([0, *(len(row) for _, _, row in self._rows)])
         lp = highspy.HighsLp()
         lp.num_col_, lp.num_row_ = len(self._cost), len(self._rows)
@@ -137,7 +142,7 @@ class _Program:
         highs = QuietHighs(solver="simplex")
         highs.passModel(lp)
         if not highs.optimise():
-            raise RuntimeError("HiGHS finds no best amounts of a plan")
+            return None
         found = np.array(highs.getSolution().col_value)
         shape = (*self._actions.shape, self._arrays.shape[2])
         amounts = Amounts(np.zeros(shape), np.zeros(shape))
@@ -212,14 +217,17 @@ class _Program:
     def _limit_weight(self, aboard: list[_Sum], capacity: float) -> None:
         weights = self._arrays.weights[0] * self._unit
         carried = sum(float(w) * constant for w, (constant, _) in zip(weights, aboard, strict=True))
+        # In parts of the capacity, unless that is nothing beside what is to be carried: HiGHS refuses a row
+        # with factors beyond 1e15.
+        part = max(capacity, _LEAST_CAPACITY * float(weights.max()))
         row = {
-            column: by * float(w) / max(capacity, 1e-300)
+            column: by * float(w) / part
             for w, (_, terms) in zip(weights, aboard, strict=True)
             for column, by in terms.items()
             if w > 0.0
         }
         if row:
-            self._rows.append((-highspy.kHighsInf, 1.0 - carried / max(capacity, 1e-300), row))
+            self._rows.append((-highspy.kHighsInf, (capacity - carried) / part, row))
 
 
 def _rates(arrays: ProblemArrays) -> Floats:

@@ -8,10 +8,12 @@ import numpy as np
 
 from app.domain.plan import Plan
 from app.domain.problem import Problem
-from app.simulation import simulator, visit
+from app.simulation import replay, simulator, visit
+from app.simulation.amounts import Amounts
 from app.simulation.arrays import Floats, ProblemArrays, compile_problem
 from app.simulation.decorators import compiled
 from app.simulation.episodes import Episodes
+from app.simulation.evaluation import replay_at_best
 
 NAMES = {
     visit.RETURNING: "returning",
@@ -25,6 +27,9 @@ NAMES = {
     visit.UNLOADS_NOTHING: "unloads_nothing",
     visit.NO_SUCH_ACTION: "no_such_action",
     visit.TOO_MANY_STEPS: "max_steps",
+    visit.TOO_MUCH: "too_much",
+    visit.NOT_IN_STOCK: "stock",
+    visit.TOO_HEAVY: "capacity",
 }
 """Rules for programs."""
 
@@ -55,11 +60,42 @@ class Breach:
     base_id: str | None = None
 
 
-def breaches_of(problem: Problem, plan: Plan) -> list[Breach]:
-    """List the actions of a plan that break a rule of greedy unloading, in the plan's order.
+def breaches_of(problem: Problem, plan: Plan, amounts: Amounts | None = None) -> list[Breach]:
+    """List the actions of a plan that break a rule, in the plan's order.
 
-    An action that is not allowed is left out, and the plan goes on without it.
+    An action that is not allowed is left out, and the plan goes on without it. Where unloading is planned
+    these are the actions that no amounts allow; if there are none, the first that these amounts forbid.
+
+    Parameters
+    ----------
+    problem, plan
+        The problem, and the plan of it.
+    amounts
+        What its stops unload and load, where that is planned; the best amounts by default.
     """
+    if not problem.plans_unloading:
+        return _walked(problem, plan)
+    forbidden = _forbidden(problem, plan, amounts)
+    return [] if forbidden == [] else _walked(problem, plan) or forbidden or []
+
+
+def _forbidden(problem: Problem, plan: Plan, amounts: Amounts | None) -> list[Breach] | None:
+    """Return the first action that a replay with amounts refuses; None where there cannot be any amounts."""
+    last = problem.n_targets + problem.n_bases
+    sound = all(0 <= action <= last for row in plan.assignment for action in row)
+    if not sound or len(plan.assignment) > problem.max_steps:
+        return None
+    arrays, actions = compile_problem(problem), plan.as_array()
+    if amounts is None:
+        result, _ = replay_at_best(arrays, actions, planned=True)
+    else:
+        result = replay.replay_with(arrays, actions, amounts)
+    rule, s, i = (int(each[0]) for each in (result.rule, result.step, result.uav))
+    return [] if rule == visit.ALLOWED else [_breach(problem, s, i, int(actions[s, i]), rule)]
+
+
+def _walked(problem: Problem, plan: Plan) -> list[Breach]:
+    """List the actions that are not allowed; where unloading is planned, whatever they unload."""
     arrays, n = compile_problem(problem), problem.n_targets
     last = n + problem.n_bases
     episodes, figures, found = simulator.new_episodes(arrays, 1), np.zeros(2), []
@@ -72,6 +108,8 @@ def breaches_of(problem: Problem, plan: Plan) -> list[Breach]:
             if not 0 <= action <= last:
                 found.append(_breach(problem, s, i, None, visit.NO_SUCH_ACTION))
                 continue
+            if problem.plans_unloading and action < n:
+                episodes.load[0, i] = episodes.need[0, action] = 1.0
             rule = visit.ALLOWED if action == n else int(simulator.verdict(arrays, episodes, 0, i, action))
             if rule == visit.ALLOWED:
                 simulator.act(arrays, episodes, 0, i, action)

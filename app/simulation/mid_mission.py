@@ -13,12 +13,9 @@ from app.domain.plan import Plan
 from app.domain.problem import ROUNDING, UAV, Problem, Target
 from app.domain.surroundings import Base
 from app.simulation.amounts import Amounts
-from app.simulation.arrays import compile_problem
 from app.simulation.breaches import breaches_of
-from app.simulation.evaluation import replay_at_best
 from app.simulation.explain import timed_routes
 from app.simulation.legs import wind_of, zones_of
-from app.simulation.visit import ALLOWED
 from app.travel.choice import legs_between
 from app.travel.legs import Legs, Way
 
@@ -93,10 +90,6 @@ def _legal_rest(problem: Problem, rests: list[list[int]]) -> tuple[tuple[int, ..
 
 def _first_broken(problem: Problem, rows: tuple[tuple[int, ...], ...]) -> tuple[int, int] | None:
     """Return step and UAV of the first action that is not allowed; None for a legal plan."""
-    if problem.plans_unloading:
-        result, _ = replay_at_best(compile_problem(problem), np.array(rows, np.int64), True)
-        legal = result.rule[0] == ALLOWED
-        return None if legal else (int(result.step[0]), int(result.uav[0]))
     broken = breaches_of(problem, Plan(rows))
     if not broken:
         return None

@@ -20,6 +20,7 @@ from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.deliveries import new_unloading
 from app.simulation.loads import serve_at_best
 from app.simulation.visit_lists import visits_of
+from app.simulation.worth import satisfaction_of
 
 _LARGEST_PROGRAM = 20_000
 """Amounts, of stops and materials, up to which a linear program is solved: some seconds at most."""
@@ -29,7 +30,8 @@ def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
     """Work out what the stops of a plan unload and load at best.
 
     Where loads are refilled, ``loaded`` is 0: the simulator knows what a reload takes. Where stocks are
-    limited then, or a program would be too large, the amounts are possible, and not always the best.
+    limited then, or a program is too large or its numbers are too far apart, the amounts are possible, and
+    not always the best.
 
     Parameters
     ----------
@@ -53,9 +55,12 @@ def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
     for known_limits, known_plan, amounts in tuple(_solved):
         if plan == known_plan and all(map(is_, limits, known_limits)):
             return amounts
-    amounts = amounts_by_program(arrays, actions)
-    _solved.append((limits, plan, amounts))
-    return amounts
+    best = amounts_by_program(arrays, actions)
+    if best is None:
+        guesses = (in_turn(arrays, actions, each) for each in (by_flow, _all_needed(arrays, actions)))
+        best = max(guesses, key=lambda guess: _satisfaction(arrays, actions, guess))
+    _solved.append((limits, plan, best))
+    return best
 
 
 _Solved = tuple[tuple[Any, ...], tuple[tuple[int, ...], bytes], Amounts]
@@ -87,6 +92,21 @@ def _is_flow(arrays: ProblemArrays, by_flow: Amounts) -> bool:
         return True
     used = by_flow.delivered.sum(axis=(0, 1))
     return arrays.n_bases == 1 and bool((used < (1.0 - ROUNDING) * arrays.stock[0, 0]).all())
+
+
+def _all_needed(arrays: ProblemArrays, actions: Integers) -> Amounts:
+    """Return amounts by which every visit would bring all that its area needs."""
+    n, wanted = arrays.shape[1], np.zeros((*actions.shape, arrays.shape[2]))
+    visits = actions < n
+    wanted[visits] = arrays.need[0][actions[visits]]
+    return Amounts(wanted, np.zeros_like(wanted))
+
+
+def _satisfaction(arrays: ProblemArrays, actions: Integers, amounts: Amounts) -> float:
+    """Return what amounts earn."""
+    met, visits = np.zeros_like(arrays.need[0]), actions < arrays.shape[1]
+    np.add.at(met, actions[visits], amounts.delivered[visits])
+    return satisfaction_of(arrays, met)
 
 
 def _by_flow(arrays: ProblemArrays, actions: Integers) -> Floats:

@@ -85,7 +85,9 @@ def unmet_targets(
     start = look_from_start(arrays, plan, open_targets)
     lookout: Lookout | SpareLookout
     counterfactuals: Counterfactuals | SpareLookout
-    if planned and keep:
+    # What the end of a plan costs is known only of amounts that stay.
+    ends = problem.objective.makespan_weight > 0.0 or problem.objective.change_weight > 0.0
+    if planned and (keep or ends):
         lookout = counterfactuals = SpareLookout(arrays, plan, actions, amounts, hurry)
     else:
         scratch = new_trial(arrays, plan), new_planned_trial(arrays, plan, actions) if planned else None

@@ -151,9 +151,11 @@ class Wording:
         needs = [name for kind, name in _SHORTFALLS if lacks & kind]
         even = f"even with the {' and '.join(needs)} that it lacks, " if needs else ""
         visit = f"{even}one more visit by {self._uav(i)}, {self._where(i, place)},"
-        if gain < 0:
-            return f"{visit} would cost {-gain:.6g} more in distance than it earns"
-        return f"{visit} would earn no more than its distance costs"
+        if self._costs_more_than_distance:
+            costs, all_costs = f"cost {-gain:.6g} more than it earns", "it costs"
+        else:
+            costs, all_costs = f"cost {-gain:.6g} more in distance than it earns", "its distance costs"
+        return f"{visit} would {costs}" if gain < 0 else f"{visit} would earn no more than {all_costs}"
 
     def loads_used(self, gain: float | None) -> str:
         """All that could be brought is unloaded elsewhere; a visit that takes it from there brings `gain`."""
@@ -249,6 +251,12 @@ class Wording:
 
     def _unit(self, unit: Unit) -> str:
         return f" {unit.wgs84}" if self._on_globe else ""
+
+    @property
+    def _costs_more_than_distance(self) -> bool:
+        """Whether time, or what a plan changes, costs reward too."""
+        objective = self._problem.objective
+        return bool(objective.half_life or objective.makespan_weight or objective.change_weight)
 
     @property
     def _on_globe(self) -> bool:

@@ -241,3 +241,8 @@ def test_legs_over_more_than_a_part_of_the_globe_are_refused():
     (error,) = caught.value.errors
     assert error.parameter == "altitude_by"
     assert "75" in error.detail
+
+
+def test_where_nobody_flies_no_leg_needs_an_altitude():
+    plan = flown([(34.0, -19.0)], [(34.1, -19.0)], ((1,),))
+    assert not planned_flights(plan, PLAIN, BY_LEG)

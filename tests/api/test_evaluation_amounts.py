@@ -64,6 +64,40 @@ def test_what_cannot_be_loaded_or_unloaded_is_refused(client, loaded, delivered,
     assert answer.status_code == 422
     assert answer.json()["type"].endswith("/docs/errors#illegal-plan")
     assert says in answer.json()["detail"]
+    (error,) = answer.json()["errors"]
+    assert error["pointer"] == (
+        "/assignment/0/0" if "unload" not in says or loaded[0] < 0 else "/assignment/1/0"
+    )
+    assert error["detail"].endswith(says)
+
+
+def test_every_action_that_no_amounts_allow_is_named_with_its_figures(client):
+    north, south = PROBLEM["targets"]
+    body = {**PROBLEM, "targets": [{**north, "y": 6}, {**south, "deadline": 0.5}]}
+    answer = client.post("/evaluate", json={**body, **PLAN})
+    assert answer.status_code == 422
+    assert [(each["pointer"], each["detail"]) for each in answer.json()["errors"]] == [
+        (
+            "/assignment/1/0",
+            "u1 to north: the visit, and the way home where it is required, exceed the voyage: "
+            "12 needed, 10 there",
+        ),
+        ("/assignment/2/0", "u1 to south: it arrives after the deadline: 1 needed, 0.5 there"),
+    ]
+    assert [(each["step"], each["rule"]) for each in answer.json()["breaches"]] == [
+        (2, "range"),
+        (3, "deadline"),
+    ]
+
+
+@pytest.mark.parametrize("unloading", ["greedy", "planned"])
+def test_an_action_of_many_digits_is_no_action(client, unloading):
+    objective = {"unloading": unloading}
+    answer = client.post("/evaluate", json={**PROBLEM, "objective": objective, "assignment": [[10**30]]})
+    assert answer.status_code == 422
+    assert answer.json()["errors"] == [
+        {"pointer": "/assignment/0/0", "detail": "u1: there is no such action"}
+    ]
 
 
 @pytest.mark.parametrize(

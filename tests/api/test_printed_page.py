@@ -8,8 +8,11 @@ from pathlib import Path
 import app
 from app.api.plan_formats.flown_plan import flown_plan
 from app.api.plan_formats.printed_page import COLOURS, printed_page
-from app.domain.problem import UAV, Problem, Target
-from app.domain.surroundings import Material
+from app.domain.plan import Plan
+from app.domain.problem import UAV, Objective, Problem, Target
+from app.domain.records import to_record
+from app.domain.surroundings import Base, Material
+from app.simulation.explain import explain
 
 NIGHT = datetime.fromisoformat("2026-03-01T22:00")
 PROBLEM = Problem(
@@ -93,3 +96,15 @@ def test_the_colours_are_those_of_the_dashboard_in_daylight():
     style = (Path(app.__file__).parent / "dashboard" / "style.css").read_text("utf-8")
     light, _ = style.split("prefers-color-scheme: dark", 1)
     assert tuple(re.findall(r"--uav-\d: (#[0-9a-f]{6})", light)) == COLOURS
+
+
+def test_one_in_the_air_whose_way_home_the_plan_does_not_have_is_on_the_map():
+    problem = Problem(
+        uavs=(UAV("stork", 0, 0, 3, 3, 1.0, 9.0, (5.0,)),),
+        targets=(Target("there", 1, 1, 1.0, (5.0,)),),
+        bases=(Base("depot", 2, 0),),
+        objective=Objective(return_to_base=False),
+    )
+    answer = {**to_record(explain(problem, Plan(((1,),)))), "job_id": "0" * 32, "algorithm": "greedy"}
+    page = printed_page(flown_plan(problem, answer))
+    assert re.search(r"<text [^>]*>stork</text>", page)

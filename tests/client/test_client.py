@@ -161,6 +161,16 @@ def test_a_refusal_names_the_field_the_value_and_the_limit(client, problem):
     assert re.fullmatch("[0-9a-f]{32}", error.request_id)
 
 
+def test_an_id_leads_nowhere_else(client, problem):
+    job = client.submit(problem, **LONG)
+    for path in (f"../jobs/{job['id']}", "..", "", "?"):
+        with pytest.raises(ServiceError) as refused:
+            client.delete_mission(path)
+        assert refused.value.status in (307, 404, 405)
+    assert client.job(job["id"])["status"] in ("queued", "running")
+    client.cancel(job["id"])
+
+
 def test_keys_are_sent(new_client, service, problem):
     with pytest.raises(ServiceError) as caught:
         new_client(service.url).allocate(problem)

@@ -160,6 +160,30 @@ def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_
     asyncio.run(scenario())
 
 
+def test_those_behind_one_whose_process_dies_wait_for_whatever_is_free_first(tmp_path):
+    warm, free = tmp_path / "warm", Path(gate(tmp_path)["path"])
+    reserve = LocalExecutor(1, warm_up="job_work:until_gate", environment={"GATE": str(warm)})
+
+    async def scenario():
+        warm.touch()
+        async with running(tmp_path, kinds=HASTY, reserve=reserve, overrun_grace_s=0.1) as service:
+            await eventually(lambda: reserve.ready == 1)
+            await service.submit("until_file", gate(tmp_path))
+            # The process that replaces the first one does not become warm before the end.
+            warm.unlink()
+            deadly = {"log": str(tmp_path / "log"), "deaths": 1, **gate(tmp_path)}
+            jobs = [(await service.submit("fragile", deadly, time_limit_s=0.3))[0]]
+            jobs += [(await service.submit("hasty", gate(tmp_path), time_limit_s=0.3))[0] for _ in range(5)]
+            await eventually(lambda: reserve.restarts == 1)
+            free.touch()
+            for job in jobs:
+                done = await finished(service, job)
+                assert (done.status, done.error) == (JobStatus.SUCCEEDED, None)
+            warm.touch()
+
+    asyncio.run(scenario())
+
+
 def test_one_that_an_earlier_process_took_in_is_answered_too(tmp_path):
     async def scenario():
         # Without a reserve it waits, and is still there at the next start.

@@ -228,3 +228,19 @@ def test_a_proposal_is_taken_where_it_fits_what_was_done_since():
     mission.tell(1.5, "proposal_accepted", offer=proposal, proposal=1)
     assert mission.routes == [["area-1", "area-3"], ["area-2"]]
     assert not mission.wants_plan
+
+
+def test_of_planned_amounts_a_stop_goes_that_cannot_be_made_and_not_one_that_loses_its_load_to_it():
+    of = problem(objective=Objective(distance_weight=0.01, unloading="planned"))
+    mission = Mission(of, ["area-1", "area-2"], [])
+    # It is worth more, needs all that is aboard, and cannot be reached in time.
+    late = {"id": "area-2", "x": 4.0, "y": 1.0, "level": 9.0, "loadlist": [4.0], "deadline": 1.0}
+    mission.tell(0.0, "areas_changed", targets=[late])
+    assert mission.routes == [["area-1"], []]
+    (broken,) = mission.effect["broken"]
+    assert (broken["target_id"], broken["rule"], broken["needed"], broken["had"]) == (
+        "area-2",
+        "deadline",
+        4,
+        1,
+    )

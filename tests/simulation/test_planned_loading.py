@@ -118,6 +118,28 @@ def test_what_is_aboard_may_stay_behind_for_another():
     assert not best_amounts(compile_problem(replace(problem, uavs=uavs[::-1])), actions[:, ::-1]).loaded.any()
 
 
+def test_one_who_can_carry_nothing_takes_nothing():
+    # Its row of weights has no right side to be divided by.
+    empty = UAV("u2", 0, 0, 0, 0, 1.0, 10.0, (0.0, 0.0), capacity=0.0)
+    problem = village(uavs=(*village().uavs, empty))
+    amounts = best_amounts(compile_problem(problem), np.array([[3, 3], [0, 1], [3, 2], [1, 2]]))
+    assert amounts.loaded[:, 0].tolist() == [[3.0, 4.0], [0.0, 0.0], [3.0, 0.0], [0.0, 0.0]]
+    assert not amounts.loaded[:, 1].any()
+    assert not amounts.delivered[:, 1].any()
+
+
+def test_amounts_too_far_apart_for_a_linear_program_are_possible_at_least():
+    uavs = (UAV("u1", 0, 0, 0, 0, 1.0, 10.0, (0.0, 3e6), capacity=6e6 + 4.0),)
+    targets = (Target("north", 0, 1, 1.0, (3e3, 1 / 3)), Target("south", 0, -1, 1.0, (2.5e9, 1e6)))
+    materials = (Material("lead", 2e9), Material("water", 2.0))
+    bases = (Base("base-1", 0, 0, stock=(1 / 3, 0.0)),)
+    problem = village(uavs=uavs, targets=targets, materials=materials, bases=bases)
+    arrays, actions = compile_problem(problem), np.array([[3], [1]])
+    result, _ = replay_at_best(arrays, actions, True)
+    assert result.rule[0] == ALLOWED
+    assert best_amounts(arrays, actions).delivered[1, 0].tolist() == [0.0, 1e6]
+
+
 def test_what_is_known_of_a_plan_is_not_taken_for_another_stock():
     arrays, actions = compile_problem(village()), np.array([[3], [0], [3], [1]])
     assert best_amounts(arrays, actions).loaded[:, 0, 0].tolist() == [3.0, 0.0, 3.0, 0.0]

@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 
+import pytest
+
+from app.domain.allocation import UnmetCode
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.surroundings import Material, Wind
@@ -60,3 +63,17 @@ def test_materials_have_their_names():
 def test_numbers_on_a_plane_have_no_units():
     unmet = only(replace(GLOBE, crs="local", targets=(replace(VILLAGE, x=250.0),)))
     assert unmet.reason.endswith("Kestrel comes closest and lacks 100")
+
+
+@pytest.mark.parametrize("unloading", ["greedy", "planned"])
+def test_what_the_end_of_a_plan_costs_counts_for_one_more_visit(unloading):
+    # It is 3 away and earns 2; the swarm is home 6 later, at 1 each.
+    objective = Objective(distance_weight=0.0, unloading=unloading, makespan_weight=1.0)
+    uav = UAV("u1", 0, 0, 0, 0, 1.0, 10.0, (5.0,))
+    problem = Problem(uavs=(uav,), targets=(Target("a", 3, 0, 2.0, (5.0,)),), objective=objective)
+    (unmet,) = explain(problem, Plan.empty(1, 1)).unmet
+    assert (unmet.code, unmet.reward_change) == (UnmetCode.NOT_WORTH_IT, -4.0)
+    assert unmet.reason.endswith("one more visit by u1, first, would cost 4 more than it earns")
+    changed = replace(objective, makespan_weight=0.0, change_weight=1.0)
+    (unmet,) = explain(replace(problem, objective=changed, start_plan=((0,),)), Plan.empty(1, 1)).unmet
+    assert (unmet.code, unmet.reward_change) == (UnmetCode.NOT_CHOSEN, 3.0)

@@ -193,3 +193,19 @@ def test_a_reload_that_leaves_something_behind_stays():
     solution = solve(problem)
     assert solution.plan.assignment == ((2, 2), (1, 0))
     assert solution.proof.proven
+
+
+def test_what_a_makespan_costs_rules_plans_out():
+    # Nothing is worth the time it takes: without that in their bounds thousands of plans are evaluated.
+    rng = np.random.default_rng(7)
+    targets = tuple(Target(f"a{j}", *rng.uniform(1, 5, 2).tolist(), 1.0, (2.0, 2.0, 2.0)) for j in range(3))
+    problem = Problem(
+        uavs=tuple(UAV(f"u{i}", i, 0, i, 0, 1.0, 30.0, (1.0, 0.5, 2.0)) for i in range(2)),
+        targets=targets,
+        bases=tuple(Base(f"base-{d}", d, 1, stock=(9.0, d, 9.0)) for d in range(2)),
+        objective=Objective(0.01, unloading="planned", loading="planned", makespan_weight=20.0),
+        max_steps=4,
+    )
+    solution = solve(problem, "greedy")
+    assert solution.plan == Plan.empty(2, 3)
+    assert solution.proof.proven

@@ -243,6 +243,8 @@ def _near(legs: Sequence[_Leg], clearance_m: float) -> list[list[int]]:
     longer they are towards its rim, so that a larger distance is asked for there: legs may be kept apart that
     are farther than that from each other, by half of it at 35 degrees from the middle.
     """
+    if not legs:
+        return []
     # A library of geometry that the web process loads for nothing else.
     import shapely  # noqa: PLC0415 - as above
 

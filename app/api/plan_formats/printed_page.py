@@ -277,7 +277,8 @@ def _shapes(plan: FlownPlan) -> Iterator[str]:
                 f'stroke-width="1.5"{_pattern(route)}/>'
             )
         if named:
-            (x_a, y_a), (x_b, y_b) = (place(on_map[x], y) for x, y in way[:2])
+            # Of one that is in the air and does not return only the place may be known.
+            (x_a, y_a), (x_b, y_b) = (place(on_map[x], y) for x, y in (*way, *way)[:2])
             yield (
                 f'<text x="{x_a + _NAME_AT * (x_b - x_a):.1f}" y="{y_a + _NAME_AT * (y_b - y_a):.1f}" '
                 f'font-weight="bold" stroke="#fff" stroke-width="3" paint-order="stroke" '

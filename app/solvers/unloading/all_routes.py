@@ -2,8 +2,8 @@
 
 Which routes a UAV can fly does not depend on amounts, so they are listed for each UAV alone. What a plan
 earns follows from its routes together; no plan earns more than its routes earn apart from each other, nor
-more at a target than is needed there. Plans that could be better by that are evaluated, the most promising
-first.
+more at a target than is needed there, and its makespan is not below the end of any route. Plans that could be
+better by that are evaluated, the most promising first.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ class _Routes(NamedTuple):
         R tuples of actions.
     cost
         (R,) reward that its distance, and what it leaves out of ``start_plan``, cost.
+    end
+        (R,) when its last stop ends; 0 without one.
     alone
         (R,) satisfaction.
     most
@@ -46,6 +48,7 @@ class _Routes(NamedTuple):
 
     stops: list[tuple[int, ...]]
     cost: Floats
+    end: Floats
     alone: Floats
     most: Floats
 
@@ -94,7 +97,7 @@ class AllRoutes:
         clock[0], aloft[0] = arrays.uavs["ready"][0, i], arrays.uavs["airborne"][0, i]
         weight = float(arrays.terms["weight"][0])
         timed = bool(arrays.terms["makespan"][0])
-        found: dict[object, tuple[float, tuple[int, ...]]] = {}
+        found: dict[object, tuple[float, float, tuple[int, ...]]] = {}
         ends: list[tuple[int, ...]] = [()]
         count = 0
         while ends:
@@ -110,10 +113,10 @@ class AllRoutes:
             cost += float(closing_cost(arrays, 0, 0.0, changes))
             kind: object = route if timed else _flights(route, n)
             if kind not in found or cost < found[kind][0]:
-                found[kind] = cost, route
+                found[kind] = cost, float(clock[len(route)]) if route else 0.0, route
             if len(route) < steps and not arrays.ret[0, i]:
                 ends += [(*route, j) for j in choices]
-        stops = [route for _, route in found.values()]
+        stops = [route for _, _, route in found.values()]
         alone, most = np.zeros(len(stops)), np.zeros((len(stops), n))
         others = arrays._replace(
             stock=arrays.stock + np.delete(arrays.load[0], i, axis=0).sum(axis=0)[None, None, :]
@@ -122,7 +125,8 @@ class AllRoutes:
             if stop():
                 return None
             alone[r], most[r] = self._alone(others, i, route)
-        return _Routes(stops, np.array([cost for cost, _ in found.values()]), alone, most)
+        cost_and_end = np.array([each[:2] for each in found.values()])
+        return _Routes(stops, cost_and_end[:, 0], cost_and_end[:, 1], alone, most)
 
     def _alone(self, arrays: ProblemArrays, i: int, route: tuple[int, ...]) -> tuple[float, Floats]:
         """Return what a route earns at most if no other UAV flies: in all, and at each target."""
@@ -147,11 +151,14 @@ class AllRoutes:
         routes = listed[order[at]]
         cost = sum(float(listed[order[q]].cost[r]) for q, r in enumerate(chosen))
         alone = sum(float(listed[order[q]].alone[r]) for q, r in enumerate(chosen))
+        end = max((float(listed[order[q]].end[r]) for q, r in enumerate(chosen)), default=0.0)
         most = sum((listed[order[q]].most[r] for q, r in enumerate(chosen)), np.zeros(len(self._needed)))
         rest = [listed[i] for i in order[at + 1 :]]
         met = np.minimum(most + routes.most + sum(each.most.max(axis=0) for each in rest), self._needed)
         bound = np.minimum(alone + routes.alone + sum(each.alone.max() for each in rest), met.sum(axis=1))
         bound = bound - cost - routes.cost - sum(each.cost.min() for each in rest)
+        # The last one lands no sooner than that.
+        bound -= float(self._arrays.terms["makespan"][0]) * np.maximum(end, routes.end)
         for r in np.argsort(-bound, kind="stable").tolist():
             if bound[r] <= self.reward + 10 * ROUNDING * max(1.0, abs(self.reward)):
                 break
