@@ -6,6 +6,7 @@ import base64
 import binascii
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import wraps
 from typing import Any
 
 from app.allocation import bounding
@@ -22,6 +23,7 @@ from app.domain.warnings import problem_warnings
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
 from app.jobs.worker import resolve
+from app.simulation.compilation import told_of_compiling
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import Deadline
@@ -33,7 +35,21 @@ _VERIFY = "app.learning.checkpoints.checkpoint:verify"
 
 answer_time = AnswerTime()
 
+_Task = Callable[[dict[str, Any], WorkContext], WorkResult]
 
+
+def _held_while_compiling(task: _Task) -> _Task:
+    """Have a task say when it needs code that is not compiled: killed, it would need it again."""
+
+    @wraps(task)
+    def run(payload: dict[str, Any], context: WorkContext) -> WorkResult:
+        with told_of_compiling(context.hold):
+            return task(payload, context)
+
+    return run
+
+
+@_held_while_compiling
 def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     """Solve a problem.
 
@@ -76,6 +92,7 @@ def allocate(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     return _result(problem, found, payload, limit)
 
 
+@_held_while_compiling
 def allocate_at_once(payload: dict[str, Any], context: WorkContext) -> WorkResult:
     """Answer a request whose time is up before a worker was free for it.
 

@@ -22,6 +22,7 @@ from app.jobs.store import JobStore
 
 REMEMBERED_DURATIONS = 50
 _UNMEASURED_DURATION_S = 1.0
+_LONGEST_HELD_S = 300.0
 _TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 8, 0.1, 5.0
 
 _log = logging.getLogger(__name__)
@@ -90,6 +91,15 @@ class Attempt:
             self.asked_to_stop = True
             self.execution.cancel()
             self.timers.append(asyncio.get_running_loop().call_later(grace_s, self.kill, reason))
+
+    def end_overdue(self, grace_s: float, held_s: float = 0.0, was_held: bool = False) -> None:
+        """End the worker, whose work did not end with its time; not while it is held, nor right after."""
+        held = self.execution is not None and self.execution.is_held()
+        if (held or was_held) and held_s < _LONGEST_HELD_S:
+            later = asyncio.get_running_loop().call_later
+            self.timers.append(later(grace_s, self.end_overdue, grace_s, held_s + grace_s, held))
+        else:
+            self.kill("time")
 
     def kill(self, reason: Reason) -> None:
         """End the worker, for the first reason that is given."""

@@ -300,7 +300,9 @@ class Dispatcher:
         )
         loop = asyncio.get_running_loop()
         if left is not None:
-            attempt.timers.append(loop.call_later(max(0.0, left) + self._grace_s, attempt.kill, "time"))
+            attempt.timers.append(
+                loop.call_later(max(0.0, left) + self._grace_s, attempt.end_overdue, self._grace_s)
+            )
         if kind.max_run_s is not None:
             attempt.timers.append(loop.call_later(kind.max_run_s, attempt.stop, self._grace_s, "time"))
         return _spawn(self._finish(attempt, attempt.execution), self._finishing)

@@ -109,6 +109,9 @@ class Worker(Protocol):
     def share(self, workers: float) -> None:
         """Tell the work how many workers' cores it may use."""
 
+    def is_held(self) -> bool:
+        """Whether its work is at something that cannot stop and ends by itself."""
+
     def kill(self) -> None:
         """End it, wherever it is; nothing happens if it is gone."""
 
@@ -144,6 +147,10 @@ class Execution:
         self._cancelled = True
         if self.worker is not None:
             self.worker.cancel()
+
+    def is_held(self) -> bool:
+        """Whether the work is at something that cannot stop and ends by itself."""
+        return self.worker is not None and self.worker.is_held()
 
     def kill(self) -> None:
         """Kill the worker, or give up waiting for one; :class:`Lost` unless the work ended meanwhile."""

@@ -32,7 +32,7 @@ from app.jobs import worker
 from app.jobs.errors import describe
 from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Work
 from app.jobs.model import Progress
-from app.jobs.work_context import CANCEL, DEADLINE, SHARE, new_control
+from app.jobs.work_context import CANCEL, DEADLINE, HELD, SHARE, new_control
 
 _starting = threading.Lock()
 
@@ -114,6 +114,7 @@ class _Worker:
             return None
         self._on_progress, self._outcome = work.on_progress, self._loop.create_future()
         self._control[CANCEL], self._control[DEADLINE] = float(cancelled), work.deadline
+        self._control[HELD] = 0.0
         call = work.labels, work.function, work.payload
         try:
             await self._loop.run_in_executor(self._sender, self._pipe.send, call)
@@ -130,6 +131,10 @@ class _Worker:
     def share(self, workers: float) -> None:
         """Tell the work how many workers' cores it may use."""
         self._control[SHARE] = workers
+
+    def is_held(self) -> bool:
+        """Whether the work is at something that ends by itself."""
+        return self._control[HELD] != 0.0
 
     def kill(self) -> None:
         """Kill the process, now or as soon as it has been made."""

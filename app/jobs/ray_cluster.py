@@ -197,6 +197,10 @@ class _Worker:
     def share(self, workers: float) -> None:
         """Do nothing: what is idle may be on another machine."""
 
+    def is_held(self) -> bool:
+        """Nothing is known of that."""
+        return False
+
     def kill(self) -> None:
         with contextlib.suppress(Exception):  # it is gone, and maybe the cluster too
             self._ray.kill(self._actor)

@@ -8,12 +8,12 @@ from collections.abc import Callable, MutableSequence
 
 from app.jobs.model import Progress
 
-CANCEL, DEADLINE, SHARE = 0, 1, 2
+CANCEL, DEADLINE, SHARE, HELD = 0, 1, 2, 3
 
 
 def new_control() -> list[float]:
     """Return a control block that nobody else sees: not cancelled, no deadline, the share of one worker."""
-    return [0.0, math.inf, 1.0]
+    return [0.0, math.inf, 1.0, 0.0]
 
 
 class WorkContext:
@@ -27,10 +27,10 @@ class WorkContext:
     report
         Called with every progress. It must be quick, the worker's own only takes a note.
     control
-        Three numbers that another process may change while the work runs: non-zero once the job is cancelled;
-        the deadline on the monotonic clock, which all processes of a machine share (infinite for none); and
-        how many workers' cores it may use, its own and those of workers that do nothing. Asking reads shared
-        memory and takes well under a microsecond.
+        Numbers that another process sees and may change while the work runs: non-zero once the job is
+        cancelled; the deadline on the monotonic clock, which all processes of a machine share (infinite for
+        none); how many workers' cores it may use, its own and those of workers that do nothing; and non-zero
+        while the work is held. Asking reads shared memory and takes well under a microsecond.
     """
 
     def __init__(
@@ -58,6 +58,10 @@ class WorkContext:
     def cancel(self) -> None:
         """Ask the work to stop."""
         self._control[CANCEL] = 1.0
+
+    def hold(self, held: bool) -> None:
+        """Say whether something holds the work that cannot stop but ends by itself: it is not killed then."""
+        self._control[HELD] = float(held)
 
     def cancelled(self) -> bool:
         """Say whether somebody asked the work to stop."""

@@ -19,7 +19,7 @@ import hashlib
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, wraps
 from pathlib import Path
@@ -32,7 +32,15 @@ from numba.core.dispatcher import Dispatcher
 
 import app.simulation.callees  # noqa: F401 - it changes how numba compiles
 
-__all__ = ["compile_in_turns", "compiled_here", "first_at", "njit", "source_stamp", "stamped_files"]
+__all__ = [
+    "compile_in_turns",
+    "compiled_here",
+    "first_at",
+    "njit",
+    "source_stamp",
+    "stamped_files",
+    "told_of_compiling",
+]
 
 _ROOT = Path(__file__).resolve().parents[2]
 """Folder that holds the package `app`."""
@@ -168,7 +176,7 @@ def compile_in_turns() -> None:
         if tuple(args) in self.overloads or isinstance(self._cache, caching.NullCache):
             return alone(self, sig)
         # A file's lock is the process's: its threads take turns at numba's own lock.
-        with global_compiler_lock, _turn(self._cache._cache_file._index_path), _few_collections():
+        with global_compiler_lock, _told(), _turn(self._cache._cache_file._index_path), _few_collections():
             misses = self._cache_misses.total()
             entry = alone(self, sig)
             _compiled_here[0] += self._cache_misses.total() - misses
@@ -183,6 +191,39 @@ def compiled_here() -> int:
 
 
 _compiled_here = [0]
+
+
+@contextmanager
+def told_of_compiling(tell: Callable[[bool], None]) -> Iterator[None]:
+    """Have it told when this process begins to compile, load or wait for a function, and when that has ended.
+
+    That cannot be stopped. It is told with :func:`compile_in_turns` only.
+    """
+    _to_tell.append(tell)
+    try:
+        yield
+    finally:
+        _to_tell.remove(tell)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """Tell it of the outermost function: others are compiled for it."""
+    _depth[0] += 1
+    try:
+        if _depth[0] == 1:
+            for tell in _to_tell:
+                tell(True)
+        yield
+    finally:
+        _depth[0] -= 1
+        if _depth[0] == 0:
+            for tell in _to_tell:
+                tell(False)
+
+
+_to_tell: list[Callable[[bool], None]] = []
+_depth = [0]
 
 
 @contextmanager

@@ -74,7 +74,8 @@ def test_flight_files_of_a_local_problem_are_refused(client, problem):
 
     assert refused.status_code == 409
     assert refused.json()["type"] == "/docs/errors#plan-not-geographic"
-    assert refused.json()["errors"] == [{"pointer": "/crs", "detail": "'local'; 'qgc-plan' needs 'wgs84'"}]
+    (error,) = refused.json()["errors"]
+    assert (error["pointer"], error["detail"]) == ("/crs", "'local'; 'qgc-plan' needs 'wgs84'")
     assert take(client, answer, "csv").status_code == 200
     assert take(client, answer, "geojson").json()["coordinates_are"] == "x and y, local"
 

@@ -123,7 +123,7 @@ def test_who_need_not_return_has_no_way_home_round_zones():
 
 def test_a_wait_that_is_too_long_to_be_told_is_named():
     far = replace(PROBLEM, targets=(PROBLEM.targets[0], replace(PROBLEM.targets[1], earliest=30.0)))
-    with pytest.raises(OutOfRange, match=r"would wait .* s at 'b'"):
+    with pytest.raises(OutOfRange, match=r"would stay .* s at 'b'"):
         waypoint_file(flown(far)[0].routes[0].flights[0], FlightChoices())
 
 

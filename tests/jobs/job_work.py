@@ -69,6 +69,14 @@ def deaf(payload: Payload, context: WorkContext) -> WorkResult:
     raise AssertionError
 
 
+def held(payload: Payload, context: WorkContext) -> WorkResult:
+    """Be at something that ends by itself for some seconds; then, if asked for, never look up again."""
+    context.hold(True)
+    time.sleep(payload["seconds"])
+    context.hold(False)
+    return deaf(payload, context) if payload.get("then_deaf") else WorkResult({"pid": os.getpid()})
+
+
 def chatter(payload: Payload, context: WorkContext) -> WorkResult:
     """Report without a pause for some seconds; the first reward is not finite."""
     context.report(Progress(0.0, best_reward=float("-inf")))

@@ -13,6 +13,7 @@ from app.jobs.reserve import Pace, Wait, due, latest_start
 HASTY = (
     *KINDS,
     JobKind("hasty", "job_work:until_file", "interactive", at_once="job_work:echo"),
+    JobKind("held", "job_work:held", "interactive", at_once="job_work:echo"),
     JobKind("stubborn", "job_work:deaf", "interactive", at_once="job_work:echo"),
     JobKind("fragile", "job_work:until_file", "interactive", at_once="job_work:die"),
 )
@@ -156,6 +157,21 @@ def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_
             known = done.result["echo"][BEST_KNOWN]
             assert (known["best_reward"], known["assignment"]) == (7.0, [[1, 0]])
             assert known["answered_by"] == "deaf"
+
+    asyncio.run(scenario())
+
+
+def test_work_that_is_held_by_what_ends_by_itself_is_given_the_time(tmp_path):
+    async def scenario():
+        async with busy(tmp_path, overrun_grace_s=0.1) as service:
+            job, _ = await service.submit("held", {"seconds": 0.8}, time_limit_s=0.1)
+            done = await finished(service, job)
+            assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
+            assert service.load().restarts == 0
+            # Held no more, it is ended as any other.
+            job, _ = await service.submit("held", {"seconds": 0.3, "then_deaf": True}, time_limit_s=0.1)
+            assert (await finished(service, job)).attempt == 2
+            await eventually(lambda: service.load().restarts == 1)
 
     asyncio.run(scenario())
 

@@ -76,3 +76,10 @@ def test_functions_copied_into_one_that_python_calls_have_no_other_callers(run):
     """LLVM knows that, so it makes those with one caller a part of it."""
     linked = "sum(line.startswith('define linkonce') for line in code.splitlines())"
     assert run(f"quartered(12); code, = quartered.inspect_llvm().values(); print({linked})") == "0"
+
+
+def test_it_is_told_when_functions_are_compiled_or_loaded_once_for_all_that_one_needs(run):
+    asked = "from app.simulation.compilation import compile_in_turns, told_of_compiling\ncompile_in_turns()\n"
+    asked += "with told_of_compiling(print): quartered(12); quartered(8)\neighth(8)"
+    for _ in range(2):
+        assert run(asked).split() == ["True", "False"]

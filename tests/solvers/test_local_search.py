@@ -253,7 +253,7 @@ def test_stopped_in_the_middle_it_returns_what_it_has():
         solution = solve(problem, moves=10**9, stop=After(allowed))
         earned = replay(problem_to_record(problem), [list(row) for row in solution.plan.assignment])["reward"]
         assert earned >= max(solution.history.reward) - 1e-9
-        assert solution.history.epoch in ([0], [0, 1])
+        assert solution.history.epoch == list(range(len(solution.history.epoch)))
 
 
 def test_what_was_used_comes_back():
