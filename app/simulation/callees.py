@@ -131,23 +131,17 @@ def _serialized(self: Any) -> Any:
 
 
 def _optimize(self: Any) -> None:
-    """Optimise a function that Python calls with all that it calls as a whole; another one cheaply, before.
+    """Tell LLVM that what is copied into a function that Python calls is called nowhere else.
 
-    The functions that were copied into it are called nowhere else. Where LLVM knows that, it makes those
-    with one caller a part of it, and drops arguments that are not used: here tuples of some dozen arrays,
-    which are hundreds of numbers a call. Searches make twice as many moves a second.
+    Then it makes functions with one caller a part of it, and drops arguments that are not used: here tuples
+    of some dozen arrays, which are hundreds of numbers a call. Searches make twice as many moves a second.
     """
     functions = [each for each in self._final_module.functions if not each.is_declaration]
     if any(each.name.startswith(_WRAPPER) for each in functions):
         for each in functions:
             if each.linkage == Linkage.linkonce_odr:
                 each.linkage = Linkage.internal
-        _optimize_whole(self)
-    else:
-        passes, builder = self._codegen._module_pass_manager(
-            loop_vectorize=False, slp_vectorize=False, opt=3, cost="cheap"
-        )
-        passes.run(self._final_module, builder)
+    _optimize_whole(self)
 
 
 def _replaced(kind: Any, method: str, by: Any) -> Any:
