@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+from urllib.parse import quote
 
 from app.mavlink.errors import PackageMissing, ServiceAway, ServiceRefused
 
@@ -24,7 +25,7 @@ class MissionClient:
     url
         Of the service.
     mission_id
-        32 hexadecimal digits.
+        As the service gave it; one part of a path, whatever it is.
     key
         API key; None without.
     """
@@ -32,7 +33,7 @@ class MissionClient:
     def __init__(self, url: str, mission_id: str, key: str | None) -> None:
         headers = {} if key is None else {"Authorization": f"Bearer {key}"}
         self._http = httpx.Client(base_url=url.rstrip("/"), headers=headers, timeout=_PATIENCE_S)
-        self._path = f"/missions/{mission_id}"
+        self._path = f"/missions/{quote(mission_id, safe='')}"
 
     def close(self) -> None:
         """Close the connections."""

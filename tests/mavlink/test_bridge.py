@@ -318,10 +318,11 @@ def test_errors_for_programs(service, begin):
         UdpStream(f"127.0.0.1:{stream.port}")
     stream.close()
     client.close()
-    nobody = MissionClient(service.url, "0" * 32, None)
-    with pytest.raises(ServiceRefused, match="404"):
-        nobody.mission()
-    nobody.close()
+    for mission_id in ("0" * 32, f"../missions/{flat.id}"):
+        nobody = MissionClient(service.url, mission_id, None)
+        with pytest.raises(ServiceRefused, match="404"):
+            nobody.mission()
+        nobody.close()
 
 
 @pytest.mark.parametrize("package", ["pymavlink", "httpx"])
