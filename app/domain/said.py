@@ -1,6 +1,6 @@
 """What is said of an error: an English text that still knows its sentence and the values in it.
 
-Whoever shows the error in another language has a translation of the sentence, and puts the values in.
+A client that shows the error in another language has a translation of the sentence, and puts the values in.
 """
 
 from __future__ import annotations

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote
 
 from app.mavlink.errors import PackageMissing, ServiceAway, ServiceRefused
 
 try:
     import httpx
+
+    from app.client.exchange import one_part
 except ModuleNotFoundError as error:
     raise PackageMissing("httpx") from error
 
@@ -33,7 +34,7 @@ class MissionClient:
     def __init__(self, url: str, mission_id: str, key: str | None) -> None:
         headers = {} if key is None else {"Authorization": f"Bearer {key}"}
         self._http = httpx.Client(base_url=url.rstrip("/"), headers=headers, timeout=_PATIENCE_S)
-        self._path = f"/missions/{quote(mission_id, safe='')}"
+        self._path = f"/missions/{one_part(mission_id)}"
 
     def close(self) -> None:
         """Close the connections."""

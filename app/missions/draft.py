@@ -9,7 +9,7 @@ from typing import Any
 from app.domain.allocation import LandingRoute
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.problem import Problem
-from app.domain.said import Said, said
+from app.domain.said import Said, noun, said
 from app.missions.effects import GONE, Broken
 from app.missions.errors import EventRefused
 from app.missions.state import Done, MissionState, Stop, without_plan
@@ -66,18 +66,18 @@ class Draft:
         EventRefused
             If there is none, or it is lost.
         """
-        i = _place(self.problem.uavs, uav_id, pointer, said("UAV"))
+        i = _place(self.problem.uavs, uav_id, pointer, noun("UAV"))
         if uav_id in self.lost:
             raise EventRefused.at(pointer, said("{id!r} is lost", id=uav_id))
         return i
 
     def target(self, target_id: str, pointer: str = "/target_id") -> int:
         """Return the place of an area, or refuse one that is not known."""
-        return _place(self.problem.targets, target_id, pointer, said("area"))
+        return _place(self.problem.targets, target_id, pointer, noun("area"))
 
     def base(self, base_id: str) -> int:
         """Return the place of a base, or refuse one that is not known."""
-        return _place(self.problem.bases, base_id, "/base_id", said("base"))
+        return _place(self.problem.bases, base_id, "/base_id", noun("base"))
 
     def replace_in(self, name: str, place: int, **changes: Any) -> None:
         """Change fields of an item of the problem."""

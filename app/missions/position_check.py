@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.domain.errors import Violation
 from app.domain.fields import Context
-from app.domain.said import said
+from app.domain.said import noun, said
 from app.missions import events
 from app.missions.model import Head
 
@@ -48,7 +48,7 @@ class PositionCheck:
                 detail = said(
                     "{id!r} is no {what} of this mission, which has {count}",
                     id=each.uav_id,
-                    what=said("UAV"),
+                    what=noun("UAV"),
                     count=len(self.uav_ids),
                 )
                 violations.append(Violation(f"/positions/{k}/uav_id", detail))
