@@ -118,7 +118,7 @@ def visit_row(s: PlainState, i: int, j: int) -> dict[str, float]:
     before = [row[i] for row in s.record.get("start_plan") or ()]
     lasts = (then.clock - craft.clock) / s.time
     return {
-        "ALLOWED": s.chosen.get(j, -1) < i,
+        "ALLOWED": s.in_order(i, j),
         "DISTANCE": distance,
         "COST": s.squash(cost),
         "VALUE": s.squash(outcome.earned),
@@ -173,7 +173,7 @@ def reload_row(s: PlainState, i: int, d: int) -> dict[str, float]:
     needy = sum(sum(need) > 0 for need in s.flight.needs)
     now = max([0.0, *(s.net(i, j) for j in range(s.n) if s.possible(i, j))])
     return {
-        "ALLOWED": s.chosen.get(s.n + 1 + d, -1) < i,
+        "ALLOWED": s.in_order(i, s.n + 1 + d),
         "DISTANCE": s.span_of(leg.ground),
         "COST": s.squash(s.cost(leg.ground)),
         "FLIGHT_TIME": s.time_of(leg.time),

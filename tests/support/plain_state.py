@@ -41,6 +41,7 @@ class PlainState:
         self.d = len(self.flight.bases)
         self.steps, self.step = self.record["max_steps"], 0
         self.weight, self.objective = weight_of(self.record), self.flight.objective
+        self.first_amounts = [list(need) for need in self.flight.needs]
         self.first_needs = [sum(need) for need in self.flight.needs]
         self.in_the_air = {i for i, craft in enumerate(self.flight.fleet) if craft.out}
         self.made, self.acted, self.chosen = set(), set(), {}
@@ -96,11 +97,11 @@ class PlainState:
             self.flight.land(craft)
         elif action > self.n:
             self.flight.reload(self.step, i, action - self.n - 1)
-            self.chosen[action] = i
+            self.chosen[action] = max(i, self.chosen.get(action, -1))
         else:
             self.flight.visit(self.step, i, action, None)
             self.made.add((i, action))
-            self.chosen[action] = i
+            self.chosen[action] = max(i, self.chosen.get(action, -1))
         self.acted.add(i)
         self._possible = {}
 
@@ -109,6 +110,23 @@ class PlainState:
         if (i, action) not in self._possible:
             self._possible[i, action] = self._try(i, action)
         return self._possible[i, action]
+
+    def in_order(self, i, action):
+        """Whether those with higher numbers leave it as much as it would get before them (note 4)."""
+        if self.chosen.get(action, -1) < i:
+            return True
+        craft = self.flight.fleet[i]
+        if action > self.n:
+            stock = self.flight.stocks[action - self.n - 1]
+            return all(
+                there >= full - have for full, have, there in zip(craft.full, craft.hold, stock, strict=True)
+            )
+        if (self.objective.get("minimum_weight") or 1.0) > 1 and (
+            self.objective.get("minimum_share") or 0
+        ) > 0:
+            return False
+        first, now = self.first_amounts[action], self.flight.needs[action]
+        return all(not was or have <= need for was, have, need in zip(first, craft.hold, now, strict=True))
 
     def _try(self, i, action):
         trial = copy.copy(self.flight)

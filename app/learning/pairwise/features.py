@@ -104,7 +104,7 @@ class BaseFeature(_Column):
 class VisitFeature(_Column):
     """What is seen of a UAV and an area: of a visit. All but the distance is 0 if it is not possible."""
 
-    ALLOWED = "1 if it is possible, and no UAV of its number or above has chosen the area in this step"
+    ALLOWED = "1 if it is possible and in order (note 4)"
     DISTANCE = "length of the leg, over span; 10 once the UAV has landed for good"
     COST = "its cost, squashed"
     VALUE = "its value, squashed"
@@ -139,7 +139,7 @@ class VisitFeature(_Column):
 class ReloadFeature(_Column):
     """What is seen of a UAV and a base: of a reload. If it is not possible the distance is 10, all else 0."""
 
-    ALLOWED = "1 if it is possible, and no UAV of its number or above has chosen the base in this step"
+    ALLOWED = "1 if it is possible and in order (note 4)"
     DISTANCE = "length of the leg, over span"
     COST = "its cost, squashed"
     FLIGHT_TIME = "time of the leg, over time"

@@ -119,7 +119,7 @@ def look_again(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, 
     """Bring the gains up to date after UAV `i` of episode `b` took an action."""
     gains.acted[b, i] = True
     if action != episodes.need.shape[1]:
-        gains.chosen[b, action] = i
+        gains.chosen[b, action] = max(i, gains.chosen[b, action])
     look_at(arrays, episodes, gains, b, i)
     if action < episodes.need.shape[1]:
         for other in range(episodes.at.shape[1]):
@@ -136,13 +136,25 @@ def begin_step(episodes: Episodes, gains: Gains, b: int) -> None:
 
 
 @compiled
-def in_order(gains: Gains, b: int, i: int, j: int) -> bool:
+def in_order(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, i: int, j: int) -> bool:
     """Whether UAV `i` may choose a place after those that have chosen it in this step.
 
     In a plan the UAVs act in the order of their numbers, so at a place they have to do so here: otherwise
-    what one unloads, or loads, would not be what it does in the plan.
+    what one unloads, or loads, would not be what it does in the plan. Where there is enough for everybody, of
+    need or of stock, it is the same in any order.
     """
-    return gains.chosen[b, j] < i
+    if gains.chosen[b, j] < i:
+        return True
+    p, n = episodes.problem[b], episodes.need.shape[1]
+    for k in range(episodes.load.shape[2]):
+        load = episodes.load[b, i, k]
+        if j > n:
+            if arrays.full[p, i, k] - load > episodes.stock[b, j - n - 1, k]:
+                return False
+        elif arrays.need[p, j, k] > 0.0 and load > episodes.need[b, j, k]:
+            return False
+    # Of first shares that earn more, everybody's part depends on the order.
+    return j > n or arrays.terms[p].bonus == 0.0
 
 
 @compiled

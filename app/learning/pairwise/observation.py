@@ -172,7 +172,7 @@ def _observe_visits(
             if steps_left > 1:
                 follow_up, around = _follow_up(arrays, episodes, gains, b, i, j)
             others = supply[j] - unloaded
-            row[VisitFeature.ALLOWED] = 1.0 if in_order(gains, b, i, j) else 0.0
+            row[VisitFeature.ALLOWED] = 1.0 if in_order(arrays, episodes, gains, b, i, j) else 0.0
             row[VisitFeature.DISTANCE] = min(d / span, FAR)
             row[VisitFeature.COST] = squash(cost / scale)
             row[VisitFeature.VALUE] = squash(value / scale)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from app.learning.pairwise.agent import PairwiseAgent, Sight
+from app.learning.pairwise.architecture import RETURNS_FROM
 from app.learning.pairwise.features import (
     AreaFeature,
     BaseFeature,
@@ -57,8 +60,9 @@ class PairwiseOnBoard(nn.Module):
         -------
         tuple of Tensor
             (M, N+1+D) Q values: visits, "return", reloads; (M, N+1+D) log-odds, minus infinity where an
-            action is not allowed; (M,) log-probability of each UAV's most likely action, minus infinity of
-            those that have acted; (1,) the UAV that acts first, the surest; (1,) its most likely action.
+            action is not allowed; (M,) log-probability of what each UAV would do, minus infinity of those
+            that have acted; (1,) the UAV that acts first, the surest; (1,) what it does: "return" from a
+            probability of ``RETURNS_FROM``, otherwise the place with the highest value.
         """
         m, n, d = uavs.shape[0], areas.shape[0], bases.shape[0]
         # One base more that is not there: then there is always one, and the same graph does without bases.
@@ -76,9 +80,12 @@ class PairwiseOnBoard(nn.Module):
         home = torch.ones_like(uavs[:, :1], dtype=torch.bool)
         allowed = torch.cat((visits[:, :, 0] > 0, home, reloads[:, :, 0] > 0), dim=1)
         logits = self.agent.logits(values).masked_fill(~allowed, -torch.inf)
-        best, choice = logits.max(dim=1)
+        places = logits.masked_fill(torch.arange(n + 1 + d) == n, -torch.inf)
+        returns = logits[:, n] - places.logsumexp(dim=1) >= math.log(RETURNS_FROM / (1 - RETURNS_FROM))
+        choice = torch.where(returns, n, places.argmax(dim=1))
+        chosen = logits.gather(1, choice[:, None])
         # From the odds of all else, so that no probability near 1 is rounded to it.
-        odds = (logits - best[:, None]).exp().scatter(1, choice[:, None], 0.0).sum(dim=1)
+        odds = (logits - chosen).exp().scatter(1, choice[:, None], 0.0).sum(dim=1)
         sureness = (-odds.log1p()).masked_fill(uavs[:, UavFeature.ACTED] > 0, -torch.inf)
         first = sureness.argmax(dim=0, keepdim=True)
         return values, logits, sureness, first, choice[first]

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from app.learning.compute.kernels import Float32s
 from app.learning.pairwise.agent import PairwiseAgent
+from app.learning.pairwise.architecture import RETURNS_FROM
 from app.learning.pairwise.gains import (
     Gains,
     begin_step,
@@ -99,13 +98,13 @@ def play(
             part = Seen(*(each[: len(once)] for each in seen))
             _ask_together(compiled_agent, part, biases, episodes.problem[once], values[: len(once)], spare())
             logits = values[place] * sharpness
-            noisy: npt.NDArray[np.floating[Any]] = logits
-            if rng is not None:
+            if rng is None:
+                choice = most_likely(logits, n)
+            else:
                 if epsilon is not None:
                     explores = rng.random(logits.shape[:2]) < epsilon[who][:, None]
                     logits = np.where(explores[:, :, None] & np.isfinite(logits), 0.0, logits)
-                noisy = logits / temperature + rng.gumbel(size=logits.shape)
-            choice = noisy.argmax(axis=2)
+                choice = (logits / temperature + rng.gumbel(size=logits.shape)).argmax(axis=2)
             sure = _log_probability(logits, choice)
             _commit(arrays, episodes, gains, who, choice, sure, plans, s, rewards)
             if rng is not None:
@@ -114,6 +113,26 @@ def play(
         if episodes.done.all():
             break
     return Played(plans, rewards)
+
+
+def most_likely(logits: Float32s, home: int) -> Integers:
+    """Return each UAV's action, (B, M): "return" if it is likely enough, otherwise the likeliest place.
+
+    Parameters
+    ----------
+    logits
+        (B, M, N+1+D), minus infinity where an action is not allowed.
+    home
+        The number of "return".
+    """
+    places = logits.copy()
+    places[:, :, home] = -np.inf
+    choice = places.argmax(axis=2)
+    best = np.take_along_axis(places, choice[:, :, None], axis=2)
+    with np.errstate(invalid="ignore", over="ignore"):
+        # Odds of a return against all places together; infinite or undefined where there is none.
+        odds = np.exp(logits[:, :, home] - best[:, :, 0]) / np.exp(places - best).sum(axis=2)
+    return np.where(odds < RETURNS_FROM / (1 - RETURNS_FROM), choice, home)
 
 
 def _log_probability(logits: Float32s, choice: Integers) -> Floats:
@@ -239,12 +258,12 @@ def _commit(
             if left == 0:
                 break
             a = choice[q, i]
-            if gains.acted[b, i] or (taken[a] and a != n) or not in_order(gains, b, i, a):
+            if gains.acted[b, i] or taken[a] or not in_order(arrays, episodes, gains, b, i, a):
                 continue
             plans[b, s, i] = a
             rewards[b] += act(arrays, episodes, b, i, a)
             look_again(arrays, episodes, gains, b, i, a)
-            taken[a] = True
+            taken[a] = a < n
             left -= 1
         rewards[b] += send_idle(arrays, episodes, gains, b, plans[b, s])
 

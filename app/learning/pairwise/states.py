@@ -126,22 +126,22 @@ def _all_levels(arrays: ProblemArrays) -> float:
 
 
 @compiled
-def _may(gains: Gains, b: int, i: int, action: int) -> bool:
+def _may(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, i: int, action: int) -> bool:
     """Whether an action is allowed, also in the order of a plan."""
     n = gains.net.shape[2]
     if action == n:
         return True
-    if not in_order(gains, b, i, action):
+    if not in_order(arrays, episodes, gains, b, i, action):
         return False
     return gains.net[b, i, action] > FORBIDDEN if action < n else gains.reloads[b, i, action - n - 1]
 
 
 @compiled
-def _has_choice(gains: Gains, b: int, i: int) -> bool:
+def _has_choice(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: int, i: int) -> bool:
     n = gains.net.shape[2]
     found = False
     for action in range(n + 1 + gains.reloads.shape[2]):
-        found |= action != n and _may(gains, b, i, action)
+        found |= action != n and _may(arrays, episodes, gains, b, i, action)
     return found
 
 
@@ -181,14 +181,16 @@ def _some_states(
                     count += 1
             for i in range(m):
                 # Without those that have not acted, a visit may be no longer what it is in the plan.
-                if acts[i] and _may(gains, 1, i, plan[s, i]):
+                if acts[i] and _may(arrays, episodes, gains, 1, i, plan[s, i]):
                     act(arrays, episodes, 1, i, plan[s, i])
                     look_again(arrays, episodes, gains, 1, i, plan[s, i])
             send_idle(arrays, episodes, gains, 1, joint)
             known = False
             for i in range(m):
-                free = not gains.acted[1, i] and _has_choice(gains, 1, i)
-                actions[found, i] = plan[s, i] if free and _may(gains, 1, i, plan[s, i]) else UNKNOWN
+                free = not gains.acted[1, i] and _has_choice(arrays, episodes, gains, 1, i)
+                actions[found, i] = (
+                    plan[s, i] if free and _may(arrays, episodes, gains, 1, i, plan[s, i]) else UNKNOWN
+                )
                 known |= actions[found, i] != UNKNOWN
             if known:
                 observe(arrays, episodes, gains, 1, seen, found)
@@ -223,7 +225,7 @@ def _all_turns(
             reward[s] += send_idle(arrays, episodes, gains, 0, joint)
             if episodes.ret[0, i]:
                 continue
-            if _has_choice(gains, 0, i):
+            if _has_choice(arrays, episodes, gains, 0, i):
                 observe(arrays, episodes, gains, 0, seen, found)
                 action[found], step[found], uav[found] = plan[s, i], s, i
                 found += 1

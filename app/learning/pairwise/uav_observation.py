@@ -95,7 +95,7 @@ def observe_reloads(arrays: ProblemArrays, episodes: Episodes, gains: Gains, b: 
                         continue
                 reached += 1
                 best = max(best, earned_by(arrays, p, j, unloaded) - cost_of(arrays, p, way))
-            row[ReloadFeature.ALLOWED] = 1.0 if in_order(gains, b, i, place) else 0.0
+            row[ReloadFeature.ALLOWED] = 1.0 if in_order(arrays, episodes, gains, b, i, place) else 0.0
             row[ReloadFeature.DISTANCE] = min(length / span, FAR)
             row[ReloadFeature.COST] = squash(cost_of(arrays, p, length) / scale)
             row[ReloadFeature.FLIGHT_TIME] = clip(travel / time, 0.0, LONG)

@@ -68,7 +68,7 @@ class Game:
             for j in places
             if j != self.plain.n
             and verdict(self.arrays, self.episodes, 0, i, j) == ALLOWED
-            and in_order(self.gains, 0, i, j)
+            and in_order(self.arrays, self.episodes, self.gains, 0, i, j)
         ]
 
     def act(self, i, action):

@@ -127,8 +127,8 @@ def test_onnx_runtime_plays_the_same_episodes_as_the_service(session, policy):
     assert reloads > 0
 
 
-def test_the_surest_that_has_not_acted_takes_its_most_likely_action_that_is_allowed(session):
-    rng = np.random.default_rng(11)
+def test_the_surest_that_has_not_acted_returns_or_takes_the_most_likely_place(session):
+    rng, returned, asked = np.random.default_rng(11), 0, 0
     for number in range(20):
         m, n, d = (int(rng.integers(low, 7)) for low in (1, 1, 0))
         shapes = ((m,), (n,), (d,), (m, n), (m, d))
@@ -147,10 +147,16 @@ def test_the_surest_that_has_not_acted_takes_its_most_likely_action_that_is_allo
         assert np.array_equal(np.isfinite(logits), np.hstack((visits, np.ones((m, 1), bool), reloads)))
         chances = np.exp(logits - logits.max(axis=1, keepdims=True))
         chances /= chances.sum(axis=1, keepdims=True)
-        expected = np.where(acted, -np.inf, np.log(chances.max(axis=1)))
+        places = np.delete(chances, n, axis=1)
+        returns = (chances[:, n] >= 0.85) | (places.sum(axis=1) == 0)
+        likeliest = places.max(axis=1, initial=0.0)
+        expected = np.where(acted, -np.inf, np.log(np.where(returns, chances[:, n], likeliest)))
+        returned, asked = returned + (returns & ~acted).sum(), asked + (~acted).sum()
         np.testing.assert_allclose(sureness, expected, atol=1e-5)
         assert sureness[uav[0]] == sureness.max()
-        assert action[0] == logits[uav[0]].argmax()
+        assert chances[uav[0], action[0]] == (chances[:, n] if returns[uav[0]] else likeliest)[uav[0]]
+        assert returns[uav[0]] == (action[0] == n)
+    assert 0 < returned < asked, "one of the two ways was never taken"
 
 
 def test_the_model_says_what_it_is_and_what_its_columns_are(session, checkpoint):

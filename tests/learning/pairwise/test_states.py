@@ -11,7 +11,7 @@ from app.domain.records import problem_to_record
 from app.learning.pairwise.features import ReloadFeature, UavFeature, VisitFeature
 from app.learning.pairwise.gains import nearness
 from app.learning.pairwise.learner import allowed, make_batch
-from app.learning.pairwise.rollout import play
+from app.learning.pairwise.rollout import most_likely, play
 from app.learning.pairwise.states import UNKNOWN, all_turns, some_states
 from app.learning.universal.episodes.observation import scales
 from app.simulation.arrays import compile_problem
@@ -102,7 +102,8 @@ def test_in_states_of_its_own_plan_the_surest_uav_does_what_is_labelled(make_pol
         with torch.inference_mode():
             values, _ = policy.agent(batch.sight)
             logits = policy.agent.logits(values).masked_fill(~allowed(batch.sight), -torch.inf)
-            chances, best = logits.softmax(dim=2).max(dim=2)
+            best = torch.from_numpy(most_likely(logits.numpy(), problem.n_targets))
+            chances = logits.softmax(dim=2).gather(2, best[:, :, None])[:, :, 0]
         idle = batch.action == UNKNOWN
         for t, step in enumerate(steps_of(states, problem)):
             landed = [uav.ret for uav in problem.uavs] | (plan[:step] == problem.n_targets).any(axis=0)
