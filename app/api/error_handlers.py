@@ -12,7 +12,7 @@ from typing import Any
 from asgi_correlation_id import correlation_id
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from sqlalchemy.exc import DataError, InterfaceError, OperationalError
+from sqlalchemy.exc import DataError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import compile_path
@@ -23,11 +23,13 @@ from app.api.head_requests import streams
 from app.api.problem_details import FieldError, problem_response
 from app.api.problem_types import PROBLEM_TYPES
 from app.api.security_headers import SECURITY_HEADERS
+from app.api.store_away import store_unavailable
 from app.domain.errors import AllocatorError, Violation
 from app.domain.said import said
 from app.field_errors import in_words
 from app.jobs import errors as job_errors
 from policy_store import errors as store_errors
+from policy_store.database import STORE_IS_AWAY
 
 _log = logging.getLogger(__name__)
 
@@ -48,7 +50,6 @@ _CODES: Mapping[type[Exception], str] = {
 Handler = Callable[[Request, Exception], Response]
 
 _DRAINING_RETRY_S = 5.0
-_STORE_IS_AWAY = (OperationalError, InterfaceError)
 
 
 def install_error_handlers(application: FastAPI) -> None:
@@ -60,7 +61,7 @@ def install_error_handlers(application: FastAPI) -> None:
     for error in _CODES:
         application.add_exception_handler(error, _known_error)
     application.add_exception_handler(DataError, _unstorable)
-    for error in _STORE_IS_AWAY:
+    for error in STORE_IS_AWAY:
         application.add_exception_handler(error, _store_unavailable)
     application.add_exception_handler(Exception, _defect)
 
@@ -72,7 +73,7 @@ def problem_of(request: Request, error: Exception) -> dict[str, Any]:
         ((AllocatorError,), _allocator_error),
         (tuple(_CODES), _known_error),
         ((DataError,), _unstorable),
-        (_STORE_IS_AWAY, _store_unavailable),
+        (STORE_IS_AWAY, _store_unavailable),
     )
     handle = next((handler for kinds, handler in known if isinstance(error, kinds)), None)
     if handle is None:
@@ -191,22 +192,10 @@ def _unstorable(request: Request, error: Exception) -> Response:
 
 
 def _store_unavailable(request: Request, error: Exception) -> Response:
-    _log.error("the database does not answer: %s", error)
-    return problem_response(
-        "store-unavailable",
-        said(
-            "the database does not answer now; whether a request that changes something was carried out is "
-            "not known, unless it comes again with the same Idempotency-Key"
-        ),
-        _instance(request),
-        headers={"Retry-After": "1"},
-    )
+    return store_unavailable(error, _instance(request))
 
 
-def _defect(request: Request, error: Exception) -> Response:  # the server logs the error
-    if isinstance(error, _STORE_IS_AWAY):
-        # Raised in the middleware, where keys are looked up.
-        return _store_unavailable(request, error)
+def _defect(request: Request, _error: Exception) -> Response:  # the server logs the error
     # This handler runs outside of the middleware that adds these to other responses.
     identifier = correlation_id.get() or ""
     return problem_response(

@@ -11,14 +11,13 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, Literal, ParamSpec, TypeVar
 
-from sqlalchemy.exc import InterfaceError, OperationalError
-
 from app.domain.said import said
 from app.jobs.errors import INTERNAL_ERROR, describe, failure
 from app.jobs.events import JobEvents
 from app.jobs.executor import Execution, Outcome, Raised, Returned
 from app.jobs.model import BEST_KNOWN, LANES, Job, JobStatus, JobSummary, Lane, Progress
 from app.jobs.store import JobStore
+from policy_store.database import STORE_IS_AWAY, first_line
 
 REMEMBERED_DURATIONS = 50
 _UNMEASURED_DURATION_S = 1.0
@@ -243,8 +242,9 @@ class Writer:
         for _ in range(_TRIES - 1):
             try:
                 return await self.write(function, *args, **kwargs)
-            except (OperationalError, InterfaceError):
-                _log.exception("the database could not be written; next try in %.1f s", pause)
+            except STORE_IS_AWAY as error:
+                told = first_line(error)
+                _log.error("the database could not be written; next try in %.1f s: %s", pause, told)
                 await asyncio.sleep(pause)
                 pause = min(2 * pause, _LONGEST_PAUSE_S)
         return await self.write(function, *args, **kwargs)

@@ -8,6 +8,8 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
+from policy_store.database import STORE_IS_AWAY, first_line
+
 _log = logging.getLogger(__name__)
 
 
@@ -80,6 +82,9 @@ class Loop:
             self._woken.clear()
             try:
                 pause_s = await self._step()
+            except STORE_IS_AWAY as error:
+                _log.error("%s; there will be another try: %s", self._failure, first_line(error))
+                await asyncio.sleep(self._again_s)
             except Exception:
                 _log.exception("%s; there will be another try", self._failure)
                 await asyncio.sleep(self._again_s)

@@ -8,8 +8,6 @@ import math
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
-from sqlalchemy.exc import InterfaceError, OperationalError
-
 from app.domain.said import said
 from app.jobs.errors import Draining, JobNotFound, QueueFull, failure
 from app.jobs.model import Idempotency, Job, JobStatus
@@ -17,6 +15,7 @@ from app.jobs.service import JobService
 from app.missions.errors import MissionBusy, MissionNotFound
 from app.missions.model import Head
 from app.missions.store import MissionStore
+from policy_store.database import STORE_IS_AWAY
 
 REPLAN = "replan"
 """The kind of job that looks for a plan."""
@@ -116,7 +115,7 @@ class Planner:
                 self._again.discard(mission_id)
                 try:
                     done = await self._step(mission_id)
-                except (QueueFull, MissionBusy, OperationalError, InterfaceError) as error:
+                except (QueueFull, MissionBusy, *STORE_IS_AWAY) as error:
                     # The plan in force stays; there will be another try.
                     _log.info("no plan could be looked for: %s", error, extra={"mission_id": mission_id})
                     wait_s = getattr(error, "retry_after_s", pause_s)

@@ -74,6 +74,7 @@ def test_a_server_that_is_away_is_said_and_come_through(two, server, problem):
     away = other.post("/allocate", json=slow)
     assert (away.status_code, away.json()["type"]) == (503, "/docs/errors#store-unavailable")
     assert away.headers["Retry-After"] == "1"
+    assert away.headers["X-Request-ID"], "it is answered as other requests are"
     server.start()
     ended = finished(one, job["id"])
     assert ended["status"] == "succeeded"

@@ -22,7 +22,9 @@ from app.api.access.hosts import Hosts
 from app.api.access.keys import ApiKey, KeyStore, Role, recognise
 from app.api.problem_details import problem_response, responses
 from app.api.problem_types import ERROR_PAGE
+from app.api.store_away import store_unavailable
 from app.domain.said import said
+from policy_store.database import STORE_IS_AWAY
 
 OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", ERROR_PAGE, "/openapi.json", "/favicon.ico"})
 """What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""
@@ -119,7 +121,11 @@ class Guard:
         role = needed_role(scope["method"], route_path(scope))
         # Whether the service lives is told without its database.
         known = self._never or role is None
-        keys = {} if known else await self._newest(scope["app"].state.services.keys)
+        try:
+            keys = {} if known else await self._newest(scope["app"].state.services.keys)
+        except STORE_IS_AWAY as error:
+            await store_unavailable(error, scope["path"])(scope, receive, send)
+            return
         is_open = self._never or not (known or keys or self._always)
         # A page elsewhere can have its own name lead to this machine, and would then read what needs no key.
         if (is_open or self._hosts.were_named) and not self._hosts.may_be(Headers(scope=scope).get("host")):

@@ -1,9 +1,9 @@
 """The consensus-based bundle algorithm: Choi, Brunet and How 2009, Algorithms 2 and 3, and Table I.
 
 Every UAV builds a bundle, its most wanted areas one after the other, and tells those in reach what it bids,
-and whom it takes for the winner of which area. Whoever is outbid gives that area back, and what it put into
-its bundle after it. Bids are warped so that they never rise within a bundle, whatever routes are worth
-(Johnson, Choi, Ponda and How 2012). Whoever believes something else than before builds its bundle from its
+and which UAV it takes for the winner of which area. One that is outbid gives that area back, and what it put
+into its bundle after it. Bids are warped so that they never rise within a bundle, whatever routes are worth
+(Johnson, Choi, Ponda and How 2012). A UAV that believes something else than before builds its bundle from its
 beginning, so that a bundle is always the one for what is believed now: where a bid falls, an earlier choice
 may be possible again.
 """

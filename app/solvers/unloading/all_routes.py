@@ -25,8 +25,8 @@ from app.solvers.protocol import StopCriterion
 _MOST_ROUTES = 3_000
 """Routes of a UAV; with more of them the plans are not listed."""
 
-_MOST_PLANS = 20_000
-"""Plans that are evaluated at most, where there is no time limit."""
+_MOST_PLANS = 2_000
+"""Plans that are evaluated at most, each in some milliseconds, where there is no time limit."""
 
 
 class _Routes(NamedTuple):
