@@ -19,6 +19,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.plan import Plan
 from app.domain.problem import Problem
 from app.domain.records import problem_from_record, to_record
+from app.domain.said import said
 from app.domain.warnings import problem_warnings
 from app.jobs.model import Progress, WorkResult
 from app.jobs.work_context import WorkContext
@@ -242,7 +243,7 @@ def register(payload: dict[str, Any], context: WorkContext) -> WorkResult:  # no
     try:
         checkpoint = base64.b64decode(payload["checkpoint_base64"], validate=True)
     except binascii.Error as error:
-        raise InvalidCheckpoint(f"the checkpoint is not base64: {error}") from None
+        raise InvalidCheckpoint(said("the checkpoint is not base64: {why}", why=str(error))) from None
     verify(checkpoint, problem_from_record(payload["problem"]))
     return WorkResult({}, checkpoint)
 

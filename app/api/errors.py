@@ -183,12 +183,16 @@ class JobWithoutCheckpoint(RequestError):
     """A job is to be registered that has learned nothing."""
 
     def __init__(self, job_id: str, status: str, *, could_keep: bool) -> None:
-        how = '; an allocation keeps what it learns if it is sent with "keep_checkpoint": true'
-        super().__init__(
-            "job-without-checkpoint",
-            f"job {job_id} ({status}) has left no checkpoint that could be registered"
-            f"{how if could_keep else ''}",
-        )
+        job = {"id": job_id, "status": str(status)}
+        if could_keep:
+            detail = said(
+                "job {id} ({status}) has left no checkpoint that could be registered; an allocation keeps "
+                'what it learns if it is sent with "keep_checkpoint": true',
+                **job,
+            )
+        else:
+            detail = said("job {id} ({status}) has left no checkpoint that could be registered", **job)
+        super().__init__("job-without-checkpoint", detail)
 
 
 class ExampleNotFound(RequestError):

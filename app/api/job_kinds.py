@@ -9,6 +9,7 @@ from sqlalchemy import Connection
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
+from app.domain.said import said
 from app.jobs.model import FollowUp, Job, JobKind, WorkResult
 from app.library.entries import new_policy
 from app.missions.planner import REPLAN
@@ -56,8 +57,12 @@ def job_kinds(
     def add_to_library(connection: Connection, job: Job, work: WorkResult) -> Mapping[str, Any]:
         if work.artifact is None:
             raise InvalidCheckpoint(
-                f"{job.kind} job {job.id} has left no checkpoint: it was stopped before its first epoch, or "
-                "its training has diverged"
+                said(
+                    "{kind} job {id} has left no checkpoint: it was stopped before its first epoch, or its "
+                    "training has diverged",
+                    kind=job.kind,
+                    id=job.id,
+                )
             )
         task = problem_from_record(job.payload["problem"])
         policy = library.add(new_policy(job.payload["name"], task, work.artifact, limits=limits), connection)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.compute.threads import one_thread
@@ -43,9 +44,17 @@ def require_memory(
     needed = stored + 4 * rows * (_ACTIVATIONS * hidden_dim + 4 * sizes.n_actions)
     if needed > MAX_TRAINING_BYTES:
         raise ProblemTooLarge(
-            f"{sizes.n_agents} agents with {sizes.n_actions} actions over {max_steps} steps, "
-            f"{parameters.buffer_size} stored episodes and batches of {batch} take {needed / 2**20:.0f} MiB; "
-            f"the limit is {MAX_TRAINING_BYTES / 2**20:.0f} MiB"
+            said(
+                "{agents} agents with {actions} actions over {steps} steps, {stored} stored episodes and "
+                "batches of {batch} take {needed} MiB; the limit is {limit} MiB",
+                agents=sizes.n_agents,
+                actions=sizes.n_actions,
+                steps=max_steps,
+                stored=parameters.buffer_size,
+                batch=batch,
+                needed=round(needed / 2**20),
+                limit=round(MAX_TRAINING_BYTES / 2**20),
+            )
         )
 
 

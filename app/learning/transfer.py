@@ -13,6 +13,7 @@ import numpy as np
 
 from app.domain.errors import InvalidParameters, Violation
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.learning.checkpoints.checkpoint import ANY_SIZE, encode
 from app.learning.checkpoints.checkpoint_time import CheckpointReserve
 from app.learning.checkpoints.source_policies import Source, SourcePolicies
@@ -98,9 +99,11 @@ def _require_trainable(source: Source, parameters: TransferQmixParameters) -> No
         If it is.
     """
     if parameters.n_epochs and isinstance(source.network, UniversalPolicy):
-        detail = (
-            f"n_epochs is {parameters.n_epochs}, and policy {source.policy.id!r} is of an architecture "
-            "that is played and not trained any more; ask for 0, or for another source"
+        detail = said(
+            "n_epochs is {epochs}, and policy {id!r} is of an architecture that is played and not trained "
+            "any more; ask for 0, or for another source",
+            epochs=parameters.n_epochs,
+            id=source.policy.id,
         )
         raise InvalidParameters(detail, [Violation("/parameters/n_epochs", detail)])
 

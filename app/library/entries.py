@@ -8,6 +8,7 @@ from typing import Any
 from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
+from app.domain.said import said
 from app.library.description import description_space, task_description
 from app.library.summary import SUMMARY_SPACE, task_summary
 from policy_store.checkpoint import ContainerLimits, read_container
@@ -21,6 +22,11 @@ METADATA_KEY = "checkpoint"
 
 _MOST_METRICS, _LONGEST_METRIC = 100, 256
 _OWN_COLUMNS = frozenset({"architecture", "algorithm", "seed", "task", "metrics"})
+
+
+def unacceptable(error: InvalidContainer) -> InvalidCheckpoint:
+    """Return the refusal of bytes that are no safetensors file, or not the one that is expected."""
+    return InvalidCheckpoint(said("not an acceptable checkpoint: {why}", why=error.reason))
 
 
 def checkpoint_metadata(checkpoint: bytes, limits: ContainerLimits = _DEFAULT_LIMITS) -> dict[str, Any]:
@@ -41,14 +47,15 @@ def checkpoint_metadata(checkpoint: bytes, limits: ContainerLimits = _DEFAULT_LI
     try:
         container = read_container(checkpoint, limits)
     except InvalidContainer as error:
-        raise InvalidCheckpoint(str(error)) from error
+        raise unacceptable(error) from error
     try:
         metadata = read_object(container.metadata.get(METADATA_KEY, ""))
     except ValueError as error:
-        raise InvalidCheckpoint(f"the file's metadata {METADATA_KEY!r} cannot be used: {error}") from None
+        detail = said("the file's metadata {key!r} cannot be used: {why}", key=METADATA_KEY, why=str(error))
+        raise InvalidCheckpoint(detail) from None
     for key in ("architecture", "algorithm"):
         if not isinstance(metadata.get(key), str):
-            raise InvalidCheckpoint(f"the checkpoint's metadata does not name its {key}")
+            raise InvalidCheckpoint(said("the checkpoint's metadata does not name its `{key}`", key=key))
     return metadata
 
 
@@ -88,7 +95,7 @@ def new_policy(
     except (InvalidPolicy, InvalidVector) as error:
         if isinstance(error, InvalidPolicy) and error.field in ("id", "name"):
             raise
-        raise InvalidCheckpoint(f"the checkpoint cannot be stored: {error}") from error
+        raise InvalidCheckpoint(said("the checkpoint cannot be stored: {why}", why=str(error))) from error
 
 
 def _entry(
@@ -125,9 +132,10 @@ def _metrics(given: object) -> dict[str, Any]:
     if given is None:
         return {}
     if not isinstance(given, dict) or len(given) > _MOST_METRICS:
-        raise InvalidCheckpoint(f"its metrics are no object of at most {_MOST_METRICS} names")
+        raise InvalidCheckpoint(said("its metrics are no object of at most {most} names", most=_MOST_METRICS))
     for name, value in given.items():
         if isinstance(value, dict | list) or len(str(value)) > _LONGEST_METRIC or len(name) > _LONGEST_METRIC:
             shown = name[:_LONGEST_METRIC]
-            raise InvalidCheckpoint(f"its metric {shown!r} is neither a number nor a short text")
+            detail = said("its metric {name!r} is neither a number nor a short text", name=shown)
+            raise InvalidCheckpoint(detail)
     return given

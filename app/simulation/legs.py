@@ -15,6 +15,7 @@ import numpy.typing as npt
 from app.domain.errors import ProblemTooLarge
 from app.domain.geometry import distance
 from app.domain.problem import Problem, Target
+from app.domain.said import said
 from app.domain.surroundings import Base
 from app.simulation.distances import between_points
 from app.travel.choice import legs_between
@@ -120,9 +121,14 @@ def leg_arrays(problem: Problem) -> LegArrays:
     stops = len(stops_of(problem))
     if len(classes) * stops**2 > MOST_LEGS:
         raise ProblemTooLarge(
-            f"{len(classes)} classes of UAVs (of other speeds in wind, of other profiles) times "
-            f"{stops}² legs between targets and bases are {len(classes) * stops**2}; "
-            f"the limit is {MOST_LEGS}",
+            said(
+                "{classes} classes of UAVs (of other speeds in wind, of other profiles) times {stops}² legs "
+                "between targets and bases are {legs}; the limit is {limit}",
+                classes=len(classes),
+                stops=stops,
+                legs=len(classes) * stops**2,
+                limit=MOST_LEGS,
+            ),
             details={"legs": len(classes) * stops**2, "limit": MOST_LEGS},
         )
     return _measured(problem, classes, wind is not None)

@@ -16,6 +16,7 @@ import numpy as np
 from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.compilation import njit
 from app.simulation.decorators import compiled
@@ -161,8 +162,15 @@ def _check_size(num_total: int, problem: Problem) -> None:
     genes = num_total * problem.max_steps * problem.n_uavs
     if genes > MAX_GENES:
         raise ProblemTooLarge(
-            f"num_total {num_total} times {problem.max_steps} steps times {problem.n_uavs} UAVs are {genes} "
-            f"genes; the limit is {MAX_GENES}",
+            said(
+                "num_total {num_total} times {steps} steps times {uavs} UAVs are {genes} genes; the limit is "
+                "{limit}",
+                num_total=num_total,
+                steps=problem.max_steps,
+                uavs=problem.n_uavs,
+                genes=genes,
+                limit=MAX_GENES,
+            ),
             details={"genes": genes, "limit": MAX_GENES},
         )
 

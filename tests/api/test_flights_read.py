@@ -18,6 +18,7 @@ from app.domain.errors import InvalidProblem
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Problem, Target
 from app.domain.records import to_record
+from app.domain.said import to_record as as_said
 from app.domain.surroundings import Base, NoFlyZone
 from app.settings import Settings
 from app.simulation.explain import explain
@@ -195,6 +196,9 @@ def test_a_file_that_is_none_says_where(content, says):
     details = refused([ReadFile("001-a.plan", None, content)])
     assert list(details) == ["/flight_files/0/content"]
     assert says in details["/flight_files/0/content"]
+    values = as_said(details["/flight_files/0/content"])["values"]
+    assert values["file"] == "001-a.plan"
+    assert values["why"].keys() == {"detail", "sentence", "values"}
 
 
 def test_all_that_is_wrong_with_all_files_is_listed():

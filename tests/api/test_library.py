@@ -334,8 +334,11 @@ def test_damaged_checkpoint_is_refused(client, policy, change):
     response = client.post("/library", json=body)
 
     assert response.status_code == 422
-    assert response.json()["type"] == "/docs/errors#invalid-checkpoint"
-    assert response.json()["errors"][0]["pointer"] == "/checkpoint"
+    refused = response.json()
+    assert refused["type"] == "/docs/errors#invalid-checkpoint"
+    assert refused["errors"][0]["pointer"] == "/checkpoint"
+    assert refused["sentence"] == refused["errors"][0]["sentence"]
+    assert refused["values"]
 
 
 def test_checkpoint_of_another_size_is_refused(client, policy):

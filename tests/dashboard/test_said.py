@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from said_sentences import said_sentences
 
+from app.api.plan_formats.waypoints import UnreadableFlight, read_flight_file
 from app.api.problem_details import problem_response
 from app.domain.said import said, to_record
 from app.field_errors import in_words
@@ -118,6 +119,16 @@ def test_an_error_without_a_translation_stays_english():
     plain = {"detail": "something else"}
     unknown = {"detail": "7 odd things", "sentence": "{count} odd things", "values": {"count": 7}}
     assert spoken("fr", ["said", plain], ["said", unknown]) == ["something else", "7 odd things"]
+
+
+def test_what_is_wrong_with_a_flight_file_is_said_within_its_name():
+    with pytest.raises(UnreadableFlight) as unread:
+        read_flight_file("QGC WPL 110\n0 1 0 16 0 0 0 0 -91.5 34 0 1\n")
+    why = to_record(said("{file}: {why}", file="a.waypoints", why=unread.value.detail))
+    assert why["detail"] == "a.waypoints: line 2: latitude -91.5 is not in -90..90"
+    assert spoken("fr", ["said", why]) == [
+        "a.waypoints\xa0: ligne 2\xa0: latitude −91,5 n’est pas entre −90 et 90"
+    ]
 
 
 def test_a_request_is_refused_in_the_words_of_its_first_field_or_of_its_type():

@@ -7,6 +7,7 @@ from safetensors.torch import load, save
 
 from app.domain.errors import InvalidCheckpoint
 from app.domain.records import problem_from_record
+from app.domain.said import to_record
 from app.learning.checkpoints.checkpoint import decode, encode, verify
 from app.learning.paper.architecture import QmixConfig
 from app.learning.paper.environment import SwarmEnvironment
@@ -109,8 +110,9 @@ def test_task_of_another_size_is_refused(data):
     ],
 )
 def test_metadata_must_be_what_this_version_writes(data, problem, fields, reason):
-    with pytest.raises(InvalidCheckpoint, match=reason):
+    with pytest.raises(InvalidCheckpoint, match=reason) as refused:
         verify(rewritten(data, **fields), problem)
+    assert "sentence" in to_record(refused.value.detail)
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.0, "3", True, 10**9, None])
@@ -176,8 +178,9 @@ def test_tensors_must_be_exactly_those_of_the_architecture(data, problem, mutate
     ],
 )
 def test_other_bytes_are_refused(broken, problem):
-    with pytest.raises(InvalidCheckpoint):
+    with pytest.raises(InvalidCheckpoint) as refused:
         verify(broken, problem)
+    assert "sentence" in to_record(refused.value.detail)
 
 
 def test_every_truncation_is_refused(data, problem):

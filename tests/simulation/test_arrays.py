@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Objective
+from app.domain.said import to_record
 from app.domain.surroundings import Base, Wind
+from app.simulation import legs
 from app.simulation.arrays import AXES, OF_UAVS, compile_problem
 from app.simulation.generator import generate
 from app.simulation.stacks import alike, part, stack, without_reloads
@@ -117,6 +120,14 @@ def test_problems_with_bases_are_stacked_only_where_they_have_as_many_targets(ba
     assert stack([whole, whole]).shape == whole.shape
     with pytest.raises(ValueError, match="as many targets"):
         stack([whole, few])
+
+
+def test_legs_that_would_not_fit_are_refused(windy, monkeypatch):
+    monkeypatch.setattr(legs, "MOST_LEGS", 71)
+    with pytest.raises(ProblemTooLarge, match="targets and bases are 72; the limit is 71") as refused:
+        legs.leg_arrays(windy)
+    told = to_record(refused.value.detail)
+    assert told["values"] == {"classes": 2, "stops": 6, "legs": 72, "limit": 71}
 
 
 def test_what_pads_a_stack_is_never_part_of_a_visit(problem):

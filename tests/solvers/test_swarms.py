@@ -1,5 +1,7 @@
 """The decoder of random keys, the searches over them, and the other algorithms for comparison."""
 
+import json
+
 import numpy as np
 import pytest
 from brute_force import best_reward
@@ -9,6 +11,7 @@ from referee import replay
 from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
+from app.domain.said import to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
@@ -118,8 +121,11 @@ def test_evaluations_follow_from_the_size():
     assert (most[0], most[-1]) == (20_000, 500)
 
 
-@pytest.mark.parametrize("name", [*SWARMS, "ant_colony"])
+@pytest.mark.parametrize("name", SEARCHES)
 def test_what_would_not_fit_is_refused(name):
     problem = generate("clustered", 700, 800, 1, np.random.default_rng(4))
-    with pytest.raises(ProblemTooLarge, match="the limit is"):
-        solve(name, problem)
+    parameters = {"message_delay": 100} if name in NEAR else {}
+    with pytest.raises(ProblemTooLarge, match="the limit is") as refused:
+        solve(name, problem, **parameters)
+    told = json.loads(json.dumps(to_record(refused.value.detail)))
+    assert told["values"]["limit"] == refused.value.details["limit"]

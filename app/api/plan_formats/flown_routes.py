@@ -18,6 +18,7 @@ from app.api.plan_formats.waypoints import FlightFile, UnreadableFlight, Waypoin
 from app.domain.errors import InvalidProblem, Violation
 from app.domain.geometry import EARTH_RADIUS_KM, distance
 from app.domain.problem import Problem
+from app.domain.said import Said, said
 from app.domain.warnings import MOST, ProblemWarning, warnings_of
 
 PASSED_OVER = "waypoint_passed_over"
@@ -97,7 +98,9 @@ def plan_of_files(problem: Problem, files: Sequence[ReadFile], within_m: float) 
         where it cannot reload. All of it is listed.
     """
     if problem.crs != "wgs84":
-        raise InvalidProblem.of([Violation("/crs", f"{problem.crs!r}; flight files need 'wgs84'")])
+        raise InvalidProblem.of(
+            [Violation("/crs", said("{crs!r}; flight files need 'wgs84'", crs=problem.crs))]
+        )
     known = _Known(problem, within_m)
     violations: list[Violation] = []
     passed_over: list[tuple[int, Waypoint]] = []
@@ -108,8 +111,8 @@ def plan_of_files(problem: Problem, files: Sequence[ReadFile], within_m: float) 
             read = _Reading(known, read_flight_file(file.content))
             flights = read.flights()
         except (UnreadableFlight, _Refused) as error:
-            field_name = "content" if isinstance(error, UnreadableFlight) else error.args[1]
-            violations.append(Violation(f"/{n}/{field_name}", f"{file.name}: {error.args[0]}"))
+            field_name = error.field if isinstance(error, _Refused) else "content"
+            violations.append(Violation(f"/{n}/{field_name}", _of(file, error.detail)))
             continue
         passed_over += [(n, item) for item in read.passed_over]
         by_uav.setdefault(uav, []).append((number, n, flights))
@@ -120,14 +123,14 @@ def plan_of_files(problem: Problem, files: Sequence[ReadFile], within_m: float) 
         ]
         for n, flight in ordered[:-1]:
             if flight.landed is None:
-                detail = f"{files[n].name}: {problem.uavs[uav].id!r} lands at no base, and cannot fly again"
-                violations.append(Violation(f"/{n}/content", detail))
+                why = said("{uav!r} lands at no base, and cannot fly again", uav=problem.uavs[uav].id)
+                violations.append(Violation(f"/{n}/content", _of(files[n], why)))
         actions[uav] = list(_actions(problem, [flight for _, flight in ordered]))
     if violations:
         inside = [Violation(f"/flight_files{each.pointer}", each.detail) for each in violations]
         raise InvalidProblem.of(inside)
     told = [
-        (f"/flight_files/{n}/content", f"{files[n].name}: {known.where(item, item.place)}")
+        (f"/flight_files/{n}/content", _of(files[n], known.where(item, item.place)))
         for n, item in passed_over[:MOST]
     ]
     # Of those that are only counted nobody reads where they are.
@@ -154,6 +157,14 @@ def _rows(problem: Problem, actions: dict[int, list[int]]) -> list[list[int]]:
 class _Refused(Exception):
     """What a file says cannot be a part of a plan: the detail, and the field at fault."""
 
+    def __init__(self, detail: Said, field: str) -> None:
+        super().__init__(detail)
+        self.detail, self.field = detail, field
+
+
+def _of(file: ReadFile, why: Said) -> Said:
+    return said("{file}: {why}", file=file.name, why=why)
+
 
 def _whose(problem: Problem, file: ReadFile) -> tuple[int, int]:
     """Return the place of a file's UAV in the swarm, from 0, and the number of the flight."""
@@ -161,12 +172,18 @@ def _whose(problem: Problem, file: ReadFile) -> tuple[int, int]:
     if file.uav_id is not None:
         known = [uav.id for uav in problem.uavs]
         if file.uav_id not in known:
-            raise _Refused(f"no UAV has the id {file.uav_id!r}", "uav_id")
+            raise _Refused(said("no UAV has the id {id!r}", id=file.uav_id), "uav_id")
         return known.index(file.uav_id), number
     if place is None:
-        raise _Refused("its name does not begin with the UAV's number, as 001-: `uav_id` is needed", "name")
+        detail = said("its name does not begin with the UAV's number, as 001-: `uav_id` is needed")
+        raise _Refused(detail, "name")
     if not 0 <= place < problem.n_uavs:
-        raise _Refused(f"its name begins with {place + 1}, and there are {problem.n_uavs} UAVs", "name")
+        detail = said(
+            "its name begins with {number}, and there are {count} UAVs",
+            number=place + 1,
+            count=problem.n_uavs,
+        )
+        raise _Refused(detail, "name")
     return place, number
 
 
@@ -217,14 +234,20 @@ class _Known:
         corners = [corner for zone in problem.no_fly_zones for corner in zone.polygon]
         self.others = _Places([*starts, *corners], within_m)
 
-    def where(self, item: Waypoint, place: Point) -> str:
+    def where(self, item: Waypoint, place: Point) -> Said:
         """Say where an item of a file is, and how far that is from what is nearest."""
         away = [(_apart_m(place, (each.x, each.y)), each.id) for each in self.problem.targets]
         away += [(_apart_m(place, (each.x, each.y)), each.id) for each in self.problem.bases]
         nearest, whose = min(away)
-        return (
-            f"{_called(item)} at latitude {place[1]:.6f}, longitude {place[0]:.6f} is at no area or "
-            f"base: the nearest, {whose!r}, is {nearest:.0f} m away, more than {self.within_m:g} m"
+        return said(
+            "{item} at latitude {latitude:.6f}, longitude {longitude:.6f} is at no area or base: the "
+            "nearest, {nearest!r}, is {away} m away, more than {within:g} m",
+            item=_called(item),
+            latitude=round(place[1], 6),
+            longitude=round(place[0], 6),
+            nearest=whose,
+            away=round(nearest),
+            within=self.within_m,
         )
 
 
@@ -232,9 +255,9 @@ def _apart_m(one: Point, other: Point) -> float:
     return _M_PER_KM * distance("wgs84", *one, *other)
 
 
-def _called(item: Waypoint) -> str:
+def _called(item: Waypoint) -> Said:
     names = _FLOWN_TO | _LANDS | _PLACES | _RELEASES | _REPEATS
-    return f"item {item.number} ({names[item.command]})"
+    return said("item {number} ({command})", number=item.number, command=names[item.command])
 
 
 class _Reading:
@@ -263,7 +286,8 @@ class _Reading:
                 at, unknown = None, None
                 continue
             if command in _REPEATS:
-                raise _Refused(f"{_called(item)}: missions that repeat items are not read", "content")
+                detail = said("{item}: missions that repeat items are not read", item=_called(item))
+                raise _Refused(detail, "content")
             if command == _RETURNS:
                 flights[-1].landed = self._base(self._file.home)
             elif base is not None:
@@ -306,10 +330,13 @@ class _Reading:
             return None
         if len(near) > 1 and near[1][0] - near[0][0] < _SAME_PLACE_M:
             one, other = (self._known.problem.targets[j].id for _, j in near[:2])
-            raise _Refused(
-                f"{_called(item)} is as near to {one!r} as to {other!r}: the file does not say which",
-                "content",
+            detail = said(
+                "{item} is as near to {one!r} as to {other!r}: the file does not say which",
+                item=_called(item),
+                one=one,
+                other=other,
             )
+            raise _Refused(detail, "content")
         return near[0][1]
 
     def _base(self, place: Point | None) -> int | None:

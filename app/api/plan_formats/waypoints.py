@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import reprlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from app.api.plan_formats.flights import Point
+from app.domain.said import Said, noun, said
 
 _WPL = "QGC WPL 110"
 _COLUMNS = 12
@@ -18,6 +20,10 @@ _AT_LATITUDE, _AT_LONGITUDE = 4, 5
 
 class UnreadableFlight(ValueError):
     """A text is no flight file; the message says where and why."""
+
+    def __init__(self, detail: Said) -> None:
+        super().__init__(detail)
+        self.detail = detail
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +75,11 @@ def read_flight_file(text: str) -> FlightFile:
     if stripped.startswith(_WPL):
         return _waypoint_file(stripped)
     raise UnreadableFlight(
-        f"it begins with {stripped[:20]!r}; a .plan is a JSON object, and waypoints begin with {_WPL!r}"
+        said(
+            "it begins with {begin!r}; a .plan is a JSON object, and waypoints begin with {wpl!r}",
+            begin=stripped[:20],
+            wpl=_WPL,
+        )
     )
 
 
@@ -80,12 +90,18 @@ def _waypoint_file(text: str) -> FlightFile:
             continue
         fields = line.split()
         if len(fields) != _COLUMNS:
-            raise UnreadableFlight(f"line {number} has {len(fields)} columns, and needs {_COLUMNS}")
-        rows.append(
-            (int(_number(fields[3], f"line {number}, command")), _place(fields[8:10], f"line {number}"))
-        )
+            raise UnreadableFlight(
+                said(
+                    "line {number} has {count} columns, and needs {columns}",
+                    number=number,
+                    count=len(fields),
+                    columns=_COLUMNS,
+                )
+            )
+        command = _number(fields[3], said("line {number}, command", number=number))
+        rows.append((int(command), _place(fields[8:10], said("line {number}", number=number))))
     if not rows:
-        raise UnreadableFlight("it has no waypoints")
+        raise UnreadableFlight(said("it has no waypoints"))
     (_, home), *items = rows
     return FlightFile(home, tuple(Waypoint(n, command, place) for n, (command, place) in enumerate(items, 1)))
 
@@ -94,13 +110,13 @@ def _plan(text: str) -> FlightFile:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise UnreadableFlight(f"it is no JSON: {error}") from None
+        raise UnreadableFlight(said("it is no JSON: {why}", why=str(error))) from None
     mission = content.get("mission")
     if content.get("fileType") != "Plan" or not isinstance(mission, dict):
-        raise UnreadableFlight("it is no .plan: `fileType` is not 'Plan', or `mission` is no object")
+        raise UnreadableFlight(said("it is no .plan: `fileType` is not 'Plan', or `mission` is no object"))
     listed = mission.get("items")
     if not isinstance(listed, list):
-        raise UnreadableFlight("`mission.items` is no list")
+        raise UnreadableFlight(said("`mission.items` is no list"))
     home = mission.get("plannedHomePosition")
     at = None
     if isinstance(home, list) and len(home) > 1:
@@ -110,24 +126,47 @@ def _plan(text: str) -> FlightFile:
 
 def _simple_items(listed: list[Any]) -> Iterator[Waypoint]:
     for number, item in enumerate(listed, 1):
-        where = f"item {number}"
         if not isinstance(item, Mapping) or item.get("type") != "SimpleItem":
-            kind = item.get("complexItemType") if isinstance(item, Mapping) else None
-            what = f"a {kind!r}" if isinstance(kind, str) else "no object"
-            raise UnreadableFlight(f"{where} is {what}; only simple items are read")
+            raise UnreadableFlight(_no_simple_item(number, item))
         params = item.get("params")
         if not isinstance(params, list) or len(params) != _PARAMETERS:
-            raise UnreadableFlight(f"`params` of {where} is no list of {_PARAMETERS} numbers")
-        command = int(_number(item.get("command"), f"`command` of {where}"))
-        yield Waypoint(number, command, _place(params[_AT_LATITUDE : _AT_LONGITUDE + 1], where))
+            raise UnreadableFlight(
+                said(
+                    "`params` of item {number} is no list of {count} numbers",
+                    number=number,
+                    count=_PARAMETERS,
+                )
+            )
+        command = int(_number(item.get("command"), said("`command` of item {number}", number=number)))
+        place = _place(params[_AT_LATITUDE : _AT_LONGITUDE + 1], said("item {number}", number=number))
+        yield Waypoint(number, command, place)
+
+
+def _no_simple_item(number: int, item: object) -> Said:
+    kind = item.get("complexItemType") if isinstance(item, Mapping) else None
+    if isinstance(kind, str):
+        return said("item {number} is a {kind!r}; only simple items are read", number=number, kind=kind)
+    return said("item {number} is no object; only simple items are read", number=number)
 
 
 def _place(written: list[Any], where: str) -> Point:
     """Return longitude and latitude; files have them the other way round."""
-    latitude, longitude = (_number(value, f"position of {where}") for value in written)
-    for name, value, limit in (("latitude", latitude, 90.0), ("longitude", longitude, 180.0)):
+    latitude, longitude = (_number(value, said("position of {where}", where=where)) for value in written)
+    for name, value, limit in (
+        (noun("latitude"), latitude, 90.0),
+        (noun("longitude"), longitude, 180.0),
+    ):
         if abs(value) > limit:
-            raise UnreadableFlight(f"{where}: {name} {value:g} is not in {-limit:g}..{limit:g}")
+            raise UnreadableFlight(
+                said(
+                    "{where}: {name} {value:g} is not in {low:g}..{high:g}",
+                    where=where,
+                    name=name,
+                    value=value,
+                    low=-limit,
+                    high=limit,
+                )
+            )
     return longitude, latitude
 
 
@@ -138,5 +177,5 @@ def _number(written: object, what: str) -> float:
     except (TypeError, ValueError, OverflowError):
         value = math.nan
     if not math.isfinite(value) or isinstance(written, bool):
-        raise UnreadableFlight(f"{what}: {written!r} is no number")
+        raise UnreadableFlight(said("{what}: {entry} is no number", what=what, entry=reprlib.repr(written)))
     return value

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import logging
+import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +24,7 @@ import app
 from app.domain.errors import InvalidCheckpoint, InvalidProblem
 from app.domain.problem import Problem
 from app.domain.records import problem_to_record
+from app.domain.said import said
 from app.learning.pairwise import architecture as pairwise
 from app.learning.pairwise.architecture import PairwiseConfig
 from app.learning.pairwise.learner import joint_values, make_decisions
@@ -38,6 +40,7 @@ from app.learning.universal.episodes.policy import UniversalPolicy
 from app.learning.universal.episodes.turns import replay_turns
 from app.learning.universal.network import architecture as universal
 from app.learning.universal.network.architecture import UniversalConfig
+from app.library.entries import unacceptable
 from app.simulation.arrays import Integers, compile_problem
 from app.solvers.greedy import greedy_plan
 from app.solvers.protocol import Parameters
@@ -183,11 +186,12 @@ def read_metadata(data: bytes) -> dict[str, Any]:
     try:
         text = read_container(data).metadata.get(_METADATA_KEY)
     except InvalidContainer as error:
-        raise InvalidCheckpoint(str(error)) from error
+        raise unacceptable(error) from error
     try:
         metadata = read_object(text or "")
     except ValueError as error:
-        raise InvalidCheckpoint(f"its metadata {_METADATA_KEY!r} cannot be used: {error}") from None
+        detail = said("its metadata {key!r} cannot be used: {why}", key=_METADATA_KEY, why=str(error))
+        raise InvalidCheckpoint(detail) from None
     _require(metadata, "format", [FORMAT])
     _require(metadata, "architecture", list(ARCHITECTURES))
     _require(metadata, "features", [ARCHITECTURES[metadata["architecture"]].features])
@@ -198,7 +202,12 @@ def _require(metadata: Mapping[str, Any], field: str, known: Sequence[object]) -
     value = metadata.get(field)
     if not any(type(value) is type(each) and value == each for each in known):
         raise InvalidCheckpoint(
-            f"its {field} is {value!r}, this version reads {' and '.join(map(repr, known))}"
+            said(
+                "its {field} is {value}, this version reads {known}",
+                field=field,
+                value=reprlib.repr(value),
+                known=[repr(each) for each in known],
+            )
         )
 
 
@@ -217,8 +226,11 @@ def decode(data: bytes) -> Checkpoint:
         container = read_container(data)
         require_tensors(container, known.tensors(config))
         require_finite(data, container)
-    except (ValueError, InvalidContainer) as error:
-        raise InvalidCheckpoint(str(error)) from error
+    except InvalidContainer as error:
+        raise unacceptable(error) from error
+    except ValueError as error:
+        # `str` of it has the text without its sentence.
+        raise InvalidCheckpoint(error.args[0]) from error
     network = known.build(config)
     network.load_state_dict(load(data), strict=True)
     return Checkpoint(config, metadata, network)
@@ -243,7 +255,7 @@ def verify(data: bytes, problem: Problem) -> None:
     known = ARCHITECTURES[checkpoint.metadata["architecture"]]
     values = known.values(checkpoint.network, checkpoint.config, problem)
     if not all(each.isfinite().all() for each in values):
-        raise InvalidCheckpoint("its networks give values of the task that are not finite")
+        raise InvalidCheckpoint(said("its networks give values of the task that are not finite"))
 
 
 def _build_paper(config: QmixConfig) -> QmixNetwork:
@@ -255,13 +267,25 @@ def _paper_values(network: QmixNetwork, config: QmixConfig, problem: Problem) ->
     sizes = (problem.n_uavs, problem.n_targets, problem.n_materials)
     if (config.n_uavs, config.n_targets, config.n_materials) != sizes:
         raise InvalidCheckpoint(
-            f"its networks are for {config.n_uavs} UAVs, {config.n_targets} targets and {config.n_materials} "
-            f"materials, the task has {sizes[0]}, {sizes[1]} and {sizes[2]}"
+            said(
+                "its networks are for {uavs} UAVs, {targets} targets and {materials} materials, the task has "
+                "{task_uavs}, {task_targets} and {task_materials}",
+                uavs=config.n_uavs,
+                targets=config.n_targets,
+                materials=config.n_materials,
+                task_uavs=sizes[0],
+                task_targets=sizes[1],
+                task_materials=sizes[2],
+            )
         )
     try:
         environment = SwarmEnvironment(problem)
     except InvalidProblem as error:
-        raise InvalidCheckpoint(f"its networks do not observe the task: {error}") from error
+        first = error.violations[0]
+        detail = said(
+            "its networks do not observe the task: {pointer}: {why}", pointer=first.pointer, why=first.detail
+        )
+        raise InvalidCheckpoint(detail) from error
     record = EpisodeRecord(environment.sizes, 1)
     environment.observe(record.states[0], record.allowed[0])
     with torch.inference_mode():

@@ -22,6 +22,7 @@ from app.domain.errors import (
     Violation,
 )
 from app.domain.problem import Problem
+from app.domain.said import Said, said
 from app.learning.checkpoints.checkpoint import ANY_SIZE, Network, decode
 from app.learning.paper.architecture import QMIX_PAPER_1, QmixConfig
 from app.learning.paper.networks import QmixNetwork
@@ -85,10 +86,15 @@ class SourcePolicies:
                 unusable += 1
         sizes = library.sizes(QMIX_PAPER_1)
         if (problem.n_uavs, problem.n_targets, problem.n_materials) in sizes:
-            units = f"{config.drqn_hidden_dim} and {config.qmix_hidden_dim}"
-            reason = f"none has {units} hidden units" + (" and can be used" if unusable else "")
+            units = {"agent": config.drqn_hidden_dim, "mixer": config.qmix_hidden_dim}
+            if unusable:
+                reason = said("none has {agent} and {mixer} hidden units and can be used", **units)
+            else:
+                reason = said("none has {agent} and {mixer} hidden units", **units)
+        elif sizes:
+            reason = said("the library has {sizes}", sizes=[f"{m}x{n}x{k}" for m, n, k in sizes])
         else:
-            reason = "the library has " + (", ".join(f"{m}x{n}x{k}" for m, n, k in sizes) or "none at all")
+            reason = said("the library has none at all")
         raise _no_source(problem, reason, sizes)
 
     def shortlist(self, problem: Problem) -> list[Source]:
@@ -116,9 +122,12 @@ class SourcePolicies:
             if len(found) == SHORTLIST:
                 break
         if not found:
-            reason = "the library has no policy for every size"
+            reason = said("the library has no policy for every size")
             if seen:
-                reason += f", that can be used; it has {len(seen)} that cannot"
+                reason = said(
+                    "the library has no policy for every size, that can be used; it has {count} that cannot",
+                    count=len(seen),
+                )
             raise _no_source(problem, reason, library.sizes())
         return found
 
@@ -148,32 +157,44 @@ class SourcePolicies:
         try:
             policy, vectors = library.get(policy_id), library.vectors(policy_id)
         except PolicyNotFound:
-            raise _bad_source(f"there is no policy {policy_id!r} in the library") from None
+            raise _bad_source(said("there is no policy {id!r} in the library", id=policy_id)) from None
         if policy.architecture != QMIX_PAPER_1 and SUMMARY_SPACE in vectors:
             if not any_size:
                 raise _bad_source(
-                    f"policy {policy_id!r} is for every size; paper mode copies one for one size"
+                    said("policy {id!r} is for every size; paper mode copies one for one size", id=policy_id)
                 )
             distance = _distance(vectors[SUMMARY_SPACE], task_summary(problem))
             return _named(library, policy, distance, ANY_SIZE)
         if policy.architecture == unusable_architecture(problem):
             raise _bad_source(
-                f"policy {policy_id!r} ({policy.architecture}) does not observe all that the problem uses; "
-                "policies for every size do"
+                said(
+                    "policy {id!r} ({architecture}) does not observe all that the problem uses; policies for "
+                    "every size do",
+                    id=policy_id,
+                    architecture=policy.architecture,
+                )
             )
         space = description_space(problem)
         same = any_size or policy.metadata.get("config") == config.as_record()
         fits = policy.architecture == QMIX_PAPER_1 and _size(policy) == _size(problem) and same
         if not fits or space not in vectors:
             raise _bad_source(
-                f"policy {policy_id!r} ({policy.architecture}, {_size(policy)}) does not fit a task of "
-                f"{_size(problem)} with {config.drqn_hidden_dim} and {config.qmix_hidden_dim} hidden units"
+                said(
+                    "policy {id!r} ({architecture}, {size}) does not fit a task of {task} with {agent} and "
+                    "{mixer} hidden units",
+                    id=policy_id,
+                    architecture=policy.architecture,
+                    size=_size(policy),
+                    task=_size(problem),
+                    agent=config.drqn_hidden_dim,
+                    mixer=config.qmix_hidden_dim,
+                )
             )
         return _named(library, policy, _distance(vectors[space], task_description(problem)), (QmixNetwork,))
 
     def _required(self, problem: Problem) -> PolicyLibrary:
         if self._library is None:
-            raise _no_source(problem, "there is no library", [])
+            raise _no_source(problem, said("there is no library"), [])
         return self._library
 
 
@@ -229,7 +250,8 @@ def _named(
     try:
         return _source(library, policy, distance, kinds)
     except (AllocatorError, PolicyStoreError) as error:
-        raise _bad_source(f"policy {policy.id!r} cannot be used: {error}") from error
+        why = error.detail if isinstance(error, AllocatorError) else str(error)
+        raise _bad_source(said("policy {id!r} cannot be used: {why}", id=policy.id, why=why)) from error
 
 
 def _source(
@@ -253,7 +275,9 @@ def _source(
             _decoded.popitem(last=False)
     _decoded.move_to_end(sha256)
     if not isinstance(network, kinds):
-        raise InvalidCheckpoint(f"its networks are not those of architecture {policy.architecture}")
+        raise InvalidCheckpoint(
+            said("its networks are not those of architecture {name}", name=policy.architecture)
+        )
     return Source(SourcePolicy(policy.id, policy.name, distance), network)
 
 
@@ -274,12 +298,14 @@ def _size(item: Any) -> str:
     return f"{item.n_uavs}x{item.n_targets}x{item.n_materials}"
 
 
-def _no_source(problem: Problem, reason: str, sizes: Sequence[tuple[int, int, int]]) -> NoCompatibleSource:
+def _no_source(problem: Problem, reason: Said, sizes: Sequence[tuple[int, int, int]]) -> NoCompatibleSource:
     return NoCompatibleSource(
-        f"no source policy for {_size(problem)} (UAVs x targets x materials): {reason}",
+        said(
+            "no source policy for {size} (UAVs x targets x materials): {why}", size=_size(problem), why=reason
+        ),
         details={"sizes": [list(size) for size in sizes]},
     )
 
 
-def _bad_source(detail: str) -> InvalidParameters:
+def _bad_source(detail: Said) -> InvalidParameters:
     return InvalidParameters(detail, [Violation("/parameters/source", detail)])

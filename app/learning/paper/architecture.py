@@ -5,8 +5,11 @@ Nothing here needs torch, so a checkpoint's shapes can be checked before anythin
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+
+from app.domain.said import said
 
 QMIX_PAPER_1 = "qmix-paper-1"
 """Architecture: a shared DRQN agent and a monotonic mixing network, for one M, N and K."""
@@ -99,11 +102,18 @@ def read_config(record: object, largest: Mapping[str, int]) -> dict[str, int]:
         If a field is missing, unknown, no integer, or out of range.
     """
     if not isinstance(record, Mapping) or set(record) != set(largest):
-        raise ValueError(f"config has not exactly the fields {', '.join(largest)}")
+        raise ValueError(said("config has not exactly the fields {names}", names=list(largest)))
     for name, limit in largest.items():
         value = record[name]
         if type(value) is not int or not 1 <= value <= limit:
-            raise ValueError(f"config field {name} is {value!r}, not an integer from 1 to {limit}")
+            raise ValueError(
+                said(
+                    "config field {name} is {value}, not an integer from 1 to {limit}",
+                    name=name,
+                    value=reprlib.repr(value),
+                    limit=limit,
+                )
+            )
     return {name: record[name] for name in largest}
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.learning.paper.architecture import NetworkSizes
 from app.learning.paper.environment import swarm_sizes
 from app.learning.paper.observations import Float32s, features_of, write_states
@@ -31,11 +32,23 @@ def count_joint_actions(problem: Problem) -> int:
     base, exponent = problem.n_targets + 1, problem.n_uavs
     count = int(base**exponent)
     if count > MAX_JOINT_ACTIONS:
-        number = str(count) if count < 10**18 else f"about 10^{len(str(count)) - 1}"
-        raise ProblemTooLarge(
-            f"{exponent} UAVs and {base - 1} targets have (N+1)^M = {base}^{exponent} = {number} joint "
-            f"actions; the limit is {MAX_JOINT_ACTIONS}"
-        )
+        sizes = {"uavs": exponent, "targets": base - 1, "base": base, "limit": MAX_JOINT_ACTIONS}
+        # Beyond that, readers of JSON round it.
+        if count < 10**15:
+            detail = said(
+                "{uavs} UAVs and {targets} targets have (N+1)^M = {base}^{uavs} = {count} joint actions; the "
+                "limit is {limit}",
+                count=count,
+                **sizes,
+            )
+        else:
+            detail = said(
+                "{uavs} UAVs and {targets} targets have (N+1)^M = {base}^{uavs} = about 10^{zeros} joint "
+                "actions; the limit is {limit}",
+                zeros=len(str(count)) - 1,
+                **sizes,
+            )
+        raise ProblemTooLarge(detail)
     return count
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.simulation.arrays import Floats, Integers, compile_problem
 from app.solvers.ant_colony.labour import Colony, live, new_colony
 from app.solvers.budget import Budget, Incumbent
@@ -32,8 +33,13 @@ class AntColony:
         shape = (problem.n_uavs, problem.n_targets + problem.n_bases)
         if shape[0] * shape[1] > MAX_THRESHOLDS:
             raise ProblemTooLarge(
-                f"{shape[0]} UAVs times {shape[1]} stops are {shape[0] * shape[1]} thresholds; "
-                f"the limit is {MAX_THRESHOLDS}",
+                said(
+                    "{uavs} UAVs times {stops} stops are {thresholds} thresholds; the limit is {limit}",
+                    uavs=shape[0],
+                    stops=shape[1],
+                    thresholds=shape[0] * shape[1],
+                    limit=MAX_THRESHOLDS,
+                ),
                 details={"thresholds": shape[0] * shape[1], "limit": MAX_THRESHOLDS},
             )
         rng = np.random.default_rng(seed_sequence(seed))

@@ -10,6 +10,7 @@ import numpy as np
 from app.domain.errors import ProblemTooLarge
 from app.domain.plan import Plan
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.simulation.arrays import Floats, Integers, ProblemArrays, compile_problem
 from app.simulation.simulator import new_episodes
 from app.solvers.budget import Budget, Incumbent
@@ -149,8 +150,15 @@ class MarketSolver(ABC, Generic[Given]):
         beliefs = problem.n_uavs * problem.n_targets * places
         if beliefs > MAX_BELIEFS:
             raise ProblemTooLarge(
-                f"{problem.n_uavs} UAVs times {problem.n_targets} areas times {places} steps and rounds of "
-                f"delay are {beliefs} beliefs; the limit is {MAX_BELIEFS}",
+                said(
+                    "{uavs} UAVs times {areas} areas times {places} steps and rounds of delay are {beliefs} "
+                    "beliefs; the limit is {limit}",
+                    uavs=problem.n_uavs,
+                    areas=problem.n_targets,
+                    places=places,
+                    beliefs=beliefs,
+                    limit=MAX_BELIEFS,
+                ),
                 details={"beliefs": beliefs, "limit": MAX_BELIEFS},
             )
         network = network_of(problem, given.communication_range, given.message_loss, given.message_delay, rng)

@@ -6,6 +6,7 @@ import numpy as np
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.simulation.arrays import compile_problem
 from app.solvers.budget import Budget, Incumbent
 from app.solvers.comparison_parameters import SemiRandomQParameters
@@ -32,8 +33,13 @@ class SemiRandomQLearning:
         values = table_size(problem.n_uavs, problem.n_targets, problem.n_bases)
         if values > MAX_VALUES:
             raise ProblemTooLarge(
-                f"tables for {problem.n_uavs} UAVs and {problem.n_targets + problem.n_bases} stops have "
-                f"{values} values; the limit is {MAX_VALUES}",
+                said(
+                    "tables for {uavs} UAVs and {stops} stops have {values} values; the limit is {limit}",
+                    uavs=problem.n_uavs,
+                    stops=problem.n_targets + problem.n_bases,
+                    values=values,
+                    limit=MAX_VALUES,
+                ),
                 details={"values": values, "limit": MAX_VALUES},
             )
         rng = np.random.default_rng(seed_sequence(seed))

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.domain.errors import ProblemTooLarge
 from app.domain.problem import Problem
+from app.domain.said import said
 from app.simulation.arrays import Floats, compile_problem
 from app.solvers.budget import Budget, Incumbent
 from app.solvers.comparison_parameters import KeySearchParameters
@@ -95,8 +96,15 @@ class KeySearch(ABC, Generic[Given]):
         keys = self.parameters.swarm * problem.n_uavs * (problem.n_targets + problem.n_bases)
         if keys > MAX_KEYS:
             raise ProblemTooLarge(
-                f"swarm {self.parameters.swarm} times {problem.n_uavs} UAVs times "
-                f"{problem.n_targets + problem.n_bases} stops are {keys} keys; the limit is {MAX_KEYS}",
+                said(
+                    "swarm {swarm} times {uavs} UAVs times {stops} stops are {keys} keys; the limit "
+                    "is {limit}",
+                    swarm=self.parameters.swarm,
+                    uavs=problem.n_uavs,
+                    stops=problem.n_targets + problem.n_bases,
+                    keys=keys,
+                    limit=MAX_KEYS,
+                ),
                 details={"keys": keys, "limit": MAX_KEYS},
             )
         rng = np.random.default_rng(seed_sequence(seed))

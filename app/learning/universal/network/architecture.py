@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+from app.domain.said import said
 from app.learning.paper.architecture import read_config
 
 QMIX_UNIVERSAL_1 = "qmix-universal-1"
@@ -49,7 +50,10 @@ class UniversalConfig:
         """
         fields = read_config(record, _LARGEST)
         if fields["width"] % HEADS:
-            raise ValueError(f"config field width is {fields['width']}, not a multiple of {HEADS}")
+            width = fields["width"]
+            raise ValueError(
+                said("config field width is {width}, not a multiple of {heads}", width=width, heads=HEADS)
+            )
         return cls(**fields)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from app.domain.errors import ProblemTooLarge
+from app.domain.said import said
 from app.learning.compute.device import learning_device
 from app.learning.pairwise.learner import Learner, make_batch, make_decisions
 from app.learning.pairwise.policy import PairwisePolicy
@@ -47,8 +48,15 @@ def require_memory(arrays: ProblemArrays) -> None:
     needed = m * steps * (300 * tokens**2 + 10_000 * tokens + 1_500 * n * m)
     if needed > MAX_BYTES:
         raise ProblemTooLarge(
-            f"fine-tuning on {m} UAVs and {n} targets over {steps} steps takes {needed / 2**20:.0f} MiB; "
-            f"the limit is {MAX_BYTES / 2**20:.0f} MiB"
+            said(
+                "fine-tuning on {uavs} UAVs and {targets} targets over {steps} steps takes {needed} MiB; "
+                "the limit is {limit} MiB",
+                uavs=m,
+                targets=n,
+                steps=steps,
+                needed=round(needed / 2**20),
+                limit=round(MAX_BYTES / 2**20),
+            )
         )
 
 
