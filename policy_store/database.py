@@ -16,25 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, make_url
-from sqlalchemy.exc import ArgumentError, InterfaceError, OperationalError
+from sqlalchemy.exc import ArgumentError
 
 from policy_store import postgresql, sqlite
 from policy_store.announcements import Announcements
 from policy_store.engines import Engines
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
 
-STORE_IS_AWAY = (OperationalError, InterfaceError)
-"""What is raised where a database is locked, full or does not answer; another try may succeed."""
-
 _NEWER = (
     "{}: the database was made by a newer version of this program; start that version, or go back to an "
     "earlier backup"
 )
-
-
-def first_line(error: Exception) -> str:
-    """Return what an error says without what SQLAlchemy adds in further lines, for the log."""
-    return str(error).partition("\n")[0]
 
 
 class _Writers:

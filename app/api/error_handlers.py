@@ -28,8 +28,8 @@ from app.domain.errors import AllocatorError, Violation
 from app.domain.said import said
 from app.field_errors import in_words
 from app.jobs import errors as job_errors
+from app.store_faults import STORE_IS_AWAY
 from policy_store import errors as store_errors
-from policy_store.database import STORE_IS_AWAY
 
 _log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from app.api.problem_details import problem_response
 from app.domain.said import said
-from policy_store.database import first_line
+from app.store_faults import first_line
 
 _log = logging.getLogger(__name__)
 

@@ -17,7 +17,7 @@ from app.jobs.events import JobEvents
 from app.jobs.executor import Execution, Outcome, Raised, Returned
 from app.jobs.model import BEST_KNOWN, LANES, Job, JobStatus, JobSummary, Lane, Progress
 from app.jobs.store import JobStore
-from policy_store.database import STORE_IS_AWAY, first_line
+from app.store_faults import STORE_IS_AWAY, first_line
 
 REMEMBERED_DURATIONS = 50
 _UNMEASURED_DURATION_S = 1.0

@@ -8,7 +8,7 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 
-from policy_store.database import STORE_IS_AWAY, first_line
+from app.store_faults import STORE_IS_AWAY, first_line
 
 _log = logging.getLogger(__name__)
 

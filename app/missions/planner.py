@@ -15,7 +15,7 @@ from app.jobs.service import JobService
 from app.missions.errors import MissionBusy, MissionNotFound
 from app.missions.model import Head
 from app.missions.store import MissionStore
-from policy_store.database import STORE_IS_AWAY
+from app.store_faults import STORE_IS_AWAY
 
 REPLAN = "replan"
 """The kind of job that looks for a plan."""

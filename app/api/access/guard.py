@@ -24,7 +24,7 @@ from app.api.problem_details import problem_response, responses
 from app.api.problem_types import ERROR_PAGE
 from app.api.store_away import store_unavailable
 from app.domain.said import said
-from policy_store.database import STORE_IS_AWAY
+from app.store_faults import STORE_IS_AWAY
 
 OPEN_PATHS = frozenset({"/", "/healthz", "/readyz", "/docs", ERROR_PAGE, "/openapi.json", "/favicon.ico"})
 """What needs no key: whether the service is well, and pages; what those show, they ask for with a key."""
