@@ -1,7 +1,7 @@
 """The policy by itself, on problems of many kinds: one roll-out, first sight, samples, and as by default.
 
-    python tests/benchmarks/bench_policy.py --work FOLDER [--policies FOLDER] [--problems 24] [--kinds A B]
-    [--ways first-sight] [--reference 1] [--workers 2]
+    python tests/benchmarks/bench_policy.py --work FOLDER [--policies FOLDER] [--problems 24] [--first 0]
+    [--kinds A B] [--ways first-sight] [--reference 1] [--workers 2]
 
 Every kind has so many fresh problems, numbered; none was trained on. Rewards are over the best of `auto` in
 ``--reference`` processor seconds, and staying at home counts as 0. Printed are means, with the lowest in
@@ -94,7 +94,8 @@ def references(
 def rows(given: argparse.Namespace, url: str) -> Iterator[str]:
     """Yield lines of Markdown: a row a kind."""
     given.work.mkdir(parents=True, exist_ok=True)
-    asked = [(kind, number) for kind in given.kinds for number in range(given.problems)]
+    numbers = range(given.first, given.first + given.problems)
+    asked = [(kind, number) for kind in given.kinds for number in numbers]
     yield "| | " + " | ".join(given.ways) + " |\n" + "| --- " * (1 + len(given.ways)) + "|"
     with ProcessPoolExecutor(given.workers) as processes:
         best = references(processes, given.work / "reference.jsonl", asked, given.reference)
@@ -104,8 +105,8 @@ def rows(given: argparse.Namespace, url: str) -> Iterator[str]:
             cells = []
             for way in given.ways:
                 work = partial(answer, url, kind, way=way)
-                earned, took = np.array(list(processes.map(work, range(given.problems)))).T
-                over = np.array([best[kind, number] for number in range(given.problems)])
+                earned, took = np.array(list(processes.map(work, numbers))).T
+                over = np.array([best[kind, number] for number in numbers])
                 share = np.clip(np.divide(earned, over, out=np.ones_like(over), where=over > 0), 0.0, None)
                 cells.append(f"{share.mean():.4f} ({share.min():.3f}), {np.median(took):.3f} s")
             yield f"| {kind} | " + " | ".join(cells) + " |"
@@ -117,6 +118,7 @@ def main() -> None:
     options.add_argument("--work", type=Path, required=True, help="folder of what `auto` found")
     options.add_argument("--policies", type=Path, help="folder of checkpoints; the shipped ones if left out")
     options.add_argument("--problems", type=int, default=24, help="of each kind")
+    options.add_argument("--first", type=int, default=0, help="number of the first problem of each")
     options.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     options.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS)[:3])
     options.add_argument("--reference", type=float, default=1.0, help="processor seconds of `auto`")

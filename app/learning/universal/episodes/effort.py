@@ -71,7 +71,7 @@ class Effort:
 def effort(arrays: ProblemArrays) -> Effort:
     """Return what a problem is given by default."""
     work = roll_out_work(arrays)
-    orders = int(np.clip(_CHOOSING_WORK / (_POLICIES * work), 1, _ORDERS))
+    orders = int(np.clip(_CHOOSING_WORK / work, 1, _ORDERS))
     return Effort(
         policy=work <= _MOST_WORK,
         policies=int(np.clip(_CHOOSING_WORK / (orders * work), 1, _POLICIES)),
