@@ -128,6 +128,17 @@ def test_other_roll_outs_can_only_help(store, policies):
     assert gained > 0.01
 
 
+def test_what_is_put_together_is_never_below_the_greedy_rule(store):
+    """Policies with random weights lose to it; alone they have nothing of it."""
+    lost = 0
+    for number in range(6):
+        problem = generate("uniform", 6, 9, 2, np.random.default_rng(53 + number))
+        by_rule = reward_of(problem, greedy_plan(problem))
+        assert reward_of(problem, solve(store, problem, **BARE).plan) >= by_rule - 1e-9
+        lost += reward_of(problem, solve(store, problem, recombine=False, **BARE).plan) < by_rule
+    assert lost > 0
+
+
 def test_one_order_is_one_policy_rolled_out_once(store, policies):
     for number in range(6):
         problem = generate("uniform", 6, 9, 2, np.random.default_rng(33 + number))
@@ -158,7 +169,7 @@ def test_bare_is_the_policys_greedy_roll_out(store, policies, one_order):
     for number in range(6):
         problem = generate("uniform", 6, 9, 2, np.random.default_rng(23 + number))
         for family in FAMILIES[:3]:
-            solution = solve(store, problem, source=family, **BARE)
+            solution = solve(store, problem, source=family, recombine=False, **BARE)
             played = play(policies[family].agent, compile_problem(problem), np.zeros(1, np.int64))
             earned = reward_of(problem, solution.plan)
             assert solution.source_policy.id == family

@@ -110,9 +110,9 @@ class UniversalTransfer:
             # Nobody can fly anywhere: every policy would stay at home.
             self._history.add(0, self._best.reward)
             return Solution(self._best.plan, self._history, used.parameters, sources[0].policy)
-        by_rule = None if used.is_bare else greedy_plan(self._problem, self._stop).as_array()[None]
-        if by_rule is not None:
-            self._best.consider(by_rule)
+        if used.recombine or not used.is_bare:
+            self._best.consider(greedy_plan(self._problem, self._stop).as_array()[None])
+            self._consider(self._best.actions[None])
         source = None
         policy_plays = self._effort.policy or used.is_bare or used.parameters.source is not None
         if policy_plays:
