@@ -40,7 +40,9 @@ def arms_of(library_url: str, kind: str) -> Mapping[str, Arm]:
     auto = create_solver("auto", parse_parameters("auto", {}), context)
     transfer = create_solver("transfer_qmix", parse_parameters("transfer_qmix", {}), context)
     # Bare: that no plan is below the greedy rule's is the service's doing, not the policy's.
-    policy = TransferQmix(TransferQmixParameters(n_epochs=0, samples=0, polish=False), context)
+    policy = TransferQmix(
+        TransferQmixParameters(n_epochs=0, samples=0, recombine=False, polish=False), context
+    )
     return {
         "none": Arm(_searching(auto, MORNING_S), replans=False),
         "insertion": Arm(_inserting),

@@ -15,7 +15,7 @@ from app.simulation.drawn_surroundings import with_surroundings
 from app.simulation.generator import FAMILIES, generate
 from app.solvers.greedy import greedy_plan
 
-DRAWN_SHARE = 0.65
+DRAWN_SHARE = 0.75
 """Share of the problems that are of no family."""
 
 SURROUNDED_SHARE = 0.3

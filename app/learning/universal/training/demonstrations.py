@@ -52,7 +52,7 @@ class Demonstration(NamedTuple):
 
 def moves_for(problem: Problem, search: float) -> int:
     """Return the moves of a search: more for larger problems, and a share of these."""
-    moves = np.clip(600 * problem.n_uavs * problem.n_targets, 30_000, 600_000)
+    moves = np.clip(180 * problem.n_uavs * problem.n_targets, 9_000, 180_000)
     return max(1, round(search * float(moves)))
 
 

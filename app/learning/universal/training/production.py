@@ -74,12 +74,12 @@ NAME = "every family and none, every size"
 class UniversalTrainingParameters(Parameters):
     """What a training of the policy for every size is made with."""
 
-    plans: int = Field(default=80, ge=1, description="Files of searched plans")
+    plans: int = Field(default=600, ge=1, description="Files of searched plans")
     rounds: int = Field(default=3, ge=0, description="How often the policy is corrected")
-    corrections: int = Field(default=40, ge=1, description="Files of corrections a round")
+    corrections: int = Field(default=100, ge=1, description="Files of corrections a round")
     size: int = Field(default=100, ge=1, description="Plans a file")
-    first_updates: int = Field(default=4000, ge=1, description="Steps of the optimiser before corrections")
-    round_updates: int = Field(default=6000, ge=1, description="Steps of the optimiser after each round's")
+    first_updates: int = Field(default=10_000, ge=1, description="Steps of the optimiser before corrections")
+    round_updates: int = Field(default=9_000, ge=1, description="Steps of the optimiser after each round's")
     lr: float = Field(default=1e-2, gt=0, description="Highest learning rate")
     td_weight: float = Field(default=0.2, ge=0, description="Weight of the TD loss beside the cross-entropy")
     width: int = Field(default=64, ge=4, multiple_of=4, description="Width of a token")
@@ -179,14 +179,15 @@ class Production:
                 yield partial(_in_pool, pool)
 
     def _fit(self, number: int, files: list[Path], before: Path | None) -> Path:
-        """Do a part of the schedule in this process, with all threads; return the state."""
+        """Do a part of the schedule in this process, with one thread less than it may; return the state."""
         p, state = self.parameters, self.work / f"fit-{number}.safetensors"
         until = p.first_updates + number * p.round_updates
         if updates_done(state) == until:
             return state
         shown = [each for file in files for each in read_demonstrations(file)]
         threads = torch.get_num_threads()
-        torch.set_num_threads(self.workers)
+        # Another thread makes the batches.
+        torch.set_num_threads(max(1, self.workers - 1))
         try:
             watch = partial(self._watch, f"fit {number}", until)
             policy = PairwisePolicy.of_seed(p.config, p.seed)
