@@ -263,8 +263,8 @@ class TransferQmixParameters(_ModalParameters):
     )
     recombine: Annotated[bool | None, _SERVICE] = Field(
         default=None,
-        description="Whether routes of all episodes, and of the greedy rule's plan, are put together to plans, "
-        "UAV by UAV; null: true, but for a single roll-out",
+        description="Whether routes of all episodes, and of the greedy rule's plan, are put together to "
+        "plans, UAV by UAV; null: true, but for a single roll-out",
     )
     n_epochs: int | None = Field(
         default=None,
