@@ -18,7 +18,7 @@ from app.api.problem_details import MEDIA_TYPE
 _FOLDER = resources.files("app.examples") / "answers"
 _PROBLEMS = "problems"
 _PARAMETER = re.compile(r"\{(\w+)\}")
-_PLACES: Mapping[str, str] = {"name": "cyclone-idai", "policy_id": "universal-5"}
+_PLACES: Mapping[str, str] = {"name": "cyclone-idai", "policy_id": "universal-6"}
 """Of parameters of paths that are no id of 32 hexadecimal digits."""
 _SOME_ID = "5f0c3a52b8e14d0f9c0d7e6a1b2c3d4e"
 

@@ -138,8 +138,8 @@ def test_missions_are_begun_told_of_and_replayed(client, problem):
 
 def test_policies_are_found_loaded_and_deleted(client, problem):
     listed = list(client.policies())
-    universal = client.policy("universal-5")
-    assert universal["checkpoint"]["size"] == len(client.checkpoint("universal-5").content)
+    universal = client.policy("universal-6")
+    assert universal["checkpoint"]["size"] == len(client.checkpoint("universal-6").content)
     nearest = client.similar(_task(problem), k=3)
     assert len(nearest) == 3
     learned = {"algorithm": "qmix", "parameters": {"mode": "paper", "n_epochs": 3}}
@@ -176,7 +176,7 @@ def test_keys_are_sent(new_client, service, problem):
         new_client(service.url).allocate(problem)
     assert (caught.value.status, caught.value.type) == (401, "unauthenticated")
     with pytest.raises(ServiceError) as caught:
-        new_client(service.url, service.keys["allocate"]).delete_policy("universal-5")
+        new_client(service.url, service.keys["allocate"]).delete_policy("universal-6")
     assert (caught.value.status, caught.value.type) == (403, "forbidden")
 
 

@@ -28,7 +28,7 @@ QMIX_UNIVERSAL_2 = "qmix-universal-2"
 UNIVERSAL_FEATURES_2 = "universal-2"
 """Version of the network inputs, which :mod:`app.learning.pairwise.features` names."""
 
-RETURNS_FROM = 0.85
+RETURNS_FROM = 0.75
 """Probability of "return" from which a UAV returns, if it acts greedily.
 
 A return is for good, and what speaks against it is spread over all places: the most likely single action

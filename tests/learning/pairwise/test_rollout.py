@@ -96,9 +96,9 @@ def plain_play(problem: Problem, at_once: int = 1) -> tuple[list[list[int]], int
 
 
 def plain_choice(values, home):
-    """Home from a probability of 0.85; otherwise the place with the highest value, if there is one."""
+    """Home from a probability of 0.75; otherwise the place with the highest value, if there is one."""
     total = sum(math.exp(SHARPNESS * value) for value in values.values())
-    if math.exp(SHARPNESS * values[home]) / total >= 0.85:
+    if math.exp(SHARPNESS * values[home]) / total >= 0.75:
         return home
     return max((action for action in values if action != home), key=values.get)
 
