@@ -1,4 +1,4 @@
-"""The policy by itself, on problems of many kinds: one roll-out, first sight, samples, and as by default.
+"""The policy by itself, on problems of many kinds: one roll-out, several, first sight, samples, and by default.
 
     python tests/benchmarks/bench_policy.py --work FOLDER [--policies FOLDER] [--problems 24] [--first 0]
     [--kinds A B] [--ways first-sight] [--reference 1] [--workers 2]
@@ -42,6 +42,7 @@ STREAM = 70_000_027
 PURE = {"n_epochs": 0, "polish": False}
 WAYS: dict[str, dict[str, Any]] = {
     "one-roll-out": {**PURE, "samples": 0, "orders": 1},
+    "alone": {**PURE, "samples": 0, "recombine": False},
     "first-sight": {**PURE, "samples": 0},
     "64-samples": {**PURE, "samples": 64},
     "default": {},
@@ -120,7 +121,7 @@ def main() -> None:
     options.add_argument("--problems", type=int, default=24, help="of each kind")
     options.add_argument("--first", type=int, default=0, help="number of the first problem of each")
     options.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    options.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS)[:3])
+    options.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS)[:4])
     options.add_argument("--reference", type=float, default=1.0, help="processor seconds of `auto`")
     options.add_argument("--workers", type=int, default=os.cpu_count())
     given = options.parse_args()
