@@ -1,4 +1,4 @@
-"""The policy by itself, on problems of many kinds: one roll-out, several, first sight, samples, and by default.
+"""The policy by itself, on problems of many kinds: roll-outs, first sight, samples, and as by default.
 
     python tests/benchmarks/bench_policy.py --work FOLDER [--policies FOLDER] [--problems 24] [--first 0]
     [--kinds A B] [--ways first-sight] [--reference 1] [--workers 2]
