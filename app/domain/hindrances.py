@@ -84,9 +84,12 @@ def _inside_zones(problem: Problem) -> Iterator[tuple[str, str]]:
     places = list(_places(problem))
     if not zones or not places:
         return
-    areas = [(target.x, target.y) for target in problem.targets]
-    corners = [corner for zone in zones for corner in zone.polygon]
-    plane = Plane.around(problem.crs, np.array([*(at for *_, at in places), *areas, *corners]))
+    # The same plane as that of the zones' rules, in which all has to lie.
+    every = [(uav.x_s, uav.y_s) for uav in problem.uavs] + [(uav.x_c, uav.y_c) for uav in problem.uavs]
+    every += [(target.x, target.y) for target in problem.targets]
+    every += [(base.x, base.y) for base in problem.bases]
+    every += [(x, y) for zone in zones for x, y in zone.polygon]
+    plane = Plane.around(problem.crs, np.array(every))
     points = plane.flat(np.array([at for *_, at in places]))
     inside = {zone.id: _inside(points, plane.flat(np.array(zone.polygon))) for zone in zones}
     for p, (pointer, what, _) in enumerate(places):
