@@ -124,3 +124,19 @@ def test_every_page_has_an_icon(shared_page, service):
     answer = page.request.get(f"{service.url}/favicon.ico")
     assert answer.status == 200
     assert re.match("image/svg", answer.headers["content-type"])
+
+
+def test_another_map_while_the_first_one_zooms_leaves_no_error(page):
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    ready(page)
+    page.evaluate("""() => new Promise((resolve) => {
+        document.querySelector(".leaflet-control-zoom-in").click();
+        setTimeout(() => {
+            const crs = document.querySelector("select[name=crs]");
+            crs.value = crs.value === "local" ? "wgs84" : "local";
+            crs.dispatchEvent(new Event("change", { bubbles: true }));
+            setTimeout(resolve, 600);
+        }, 120);
+    })""")
+    assert errors == []
