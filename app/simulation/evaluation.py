@@ -88,15 +88,12 @@ def replay_at_best(
         return rewards_of(arrays, actions[None]), None
     amounts = best_amounts(arrays, actions)
     result = replay.replay_with(arrays, actions, amounts)
-    possible = result.rule[0] == visit.ALLOWED
-    if arrays.terms["plans_loading"][0] or (possible and not arrays.n_bases):
+    if not arrays.n_bases or arrays.terms["plans_loading"][0]:
         return result, amounts
-    # Where refilling takes from a limited stock what others need, keeping material need not pay; and every
-    # plan that is legal by the rule of greedy unloading is legal with the amounts of that rule.
+    # Where refilling takes from a limited stock what others need, keeping material need not pay.
     greedy = rewards_of(arrays, actions[None])
-    legal = greedy.rule[0] == visit.ALLOWED
-    better = legal and (not possible or greedy.reward[0] > result.reward[0])
-    return (greedy, None) if better or (arrays.n_bases and not possible) else (result, amounts)
+    worse = greedy.rule[0] != visit.ALLOWED or greedy.reward[0] <= result.reward[0]
+    return (result, amounts) if worse and result.rule[0] == visit.ALLOWED else (greedy, None)
 
 
 def _refuse_illegal(problem: Problem, actions: Actions, result: replay.Replay) -> None:

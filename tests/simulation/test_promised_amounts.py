@@ -2,7 +2,6 @@
 
 import pytest
 
-from app.domain.matrices import Matrix
 from app.domain.plan import Plan
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.surroundings import Base
@@ -63,23 +62,3 @@ def test_no_algorithm_stays_at_home_because_of_a_promise(name):
     plan = solver.solve(PROMISED, 1, Never(), lambda _progress: None).plan
     assert plan.as_array().tolist() == [[0], [1]]
     assert reward_of(PROMISED, plan) == pytest.approx(5.0 - 0.01 * 4, rel=1e-4)
-
-
-def test_a_stop_on_the_only_way_is_kept_though_the_best_amounts_pass_it_by():
-    no_way = {"road": Matrix([[0.0, 1.0, None], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]])}
-    problem = Problem(
-        uavs=(UAV("hawk", 0, 0, 0, 0, speed=1.0, voyage=9.0, loadlist=(5.0,), location=0),),
-        targets=(
-            Target("cheap", 1, 0, level=1.0, loadlist=(4.0,), location=1),
-            Target("dear", 2, 0, level=5.0, loadlist=(5.0,), location=2),
-        ),
-        matrices=no_way,
-        objective=PLANNED,
-    )
-    solver = create_solver(
-        "local_search", parse_parameters("local_search", {}), SolverContext("sqlite://", 1, lambda: 0)
-    )
-    plan = solver.solve(problem, 1, Never(), lambda _progress: None).plan
-    # By the rule of greedy unloading: 4 of 5 on the way, and the last one where it earns most.
-    assert plan.as_array().tolist() == [[0], [1]]
-    assert reward_of(problem, plan) == pytest.approx(1.0 + 1.0 - 0.01 * 3)

@@ -157,13 +157,10 @@ class _Incumbent:
 
     def consider_actions(self, actions: Actions) -> None:
         """As :meth:`consider`, for (S, M) joint actions."""
-        useful = without_useless(self.arrays, actions)
-        reward = _reward(self.arrays, useful)
-        if reward == -np.inf:
-            # Without a stop on the way a longer one is left, or none.
-            useful, reward = actions, _reward(self.arrays, actions)
+        actions = without_useless(self.arrays, actions)
+        reward = _reward(self.arrays, actions)
         if reward > self.reward:
-            self.plan, self.reward = Plan.of(useful, self.problem.n_targets), reward
+            self.plan, self.reward = Plan.of(actions, self.problem.n_targets), reward
 
 
 def greedily(problem: Problem) -> Problem:
