@@ -140,3 +140,18 @@ def test_another_map_while_the_first_one_zooms_leaves_no_error(page):
         }, 120);
     })""")
     assert errors == []
+
+
+def test_keys_before_the_map_is_made_leave_no_error(page):
+    errors, held = [], []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.route("**/dashboard/settings.json", lambda route: held.append(route))  # noqa: PLW0108
+    with page.expect_request("**/dashboard/settings.json"):
+        page.reload(wait_until="commit")
+    page.keyboard.press("Escape")
+    page.keyboard.press("Control+z")
+    for route in held:
+        route.continue_()
+    page.unroute("**/dashboard/settings.json")
+    ready(page)
+    assert errors == []
