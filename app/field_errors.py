@@ -36,10 +36,10 @@ NEEDS: Mapping[str, str] = {
 """What a value of another type is told, by the kind of error."""
 
 LIMITS: Mapping[str, tuple[str, str]] = {
-    "greater_than_equal": ("{given}, must be at least {limit:.15g}", "ge"),
-    "greater_than": ("{given}, must be more than {limit:.15g}", "gt"),
-    "less_than_equal": ("{given}, must be at most {limit:.15g}", "le"),
-    "less_than": ("{given}, must be less than {limit:.15g}", "lt"),
+    "greater_than_equal": ("{given}, must be at least {limit:.16g}", "ge"),
+    "greater_than": ("{given}, must be more than {limit:.16g}", "gt"),
+    "less_than_equal": ("{given}, must be at most {limit:.16g}", "le"),
+    "less_than": ("{given}, must be less than {limit:.16g}", "lt"),
 }
 """What a number beyond a limit is told, and the name of the limit, by the kind of error."""
 
@@ -56,7 +56,9 @@ def in_words(error: Mapping[str, Any], names: Sequence[str] = ()) -> str:
     """
     kind, given, limits = error["type"], error.get("input"), error.get("ctx", {})
     if kind in NEEDS:
-        return said(NEEDS[kind], given=_value(given))
+        # Where a type is asked for, a text with a number in it is a text.
+        as_text = isinstance(given, str) and kind.endswith("_type")
+        return said(NEEDS[kind], given=said("is a text") if as_text else _value(given))
     if limits.get("ge") == MIN_MAGNITUDE and isinstance(given, int | float) and given <= 0:
         # A limit that only keeps a number from being 0.
         kind, limits = "greater_than", {"gt": 0}

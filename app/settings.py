@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ipaddress
+import json
+import re
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -15,9 +17,22 @@ Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 OWN_CLUSTER = "local"
 
+_ANY = "*"
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/\s,]+", re.IGNORECASE)
+_HOST = re.compile(r"[^/:\s]+")
+
 _SECONDS_A_DAY = 86_400.0
 _PUTTING_BACK_S = 2.0
 """What is left of the time for a shutdown when the jobs that still run are put back into the queue."""
+
+
+def _is_network(text: str) -> bool:
+    """Whether a text is an address, or a network in the form of 192.0.2.0/24."""
+    try:
+        ipaddress.ip_network(text, strict=False)
+    except ValueError:
+        return False
+    return True
 
 
 class Settings(BaseSettings):
@@ -55,8 +70,8 @@ class Settings(BaseSettings):
     )
     trusted_proxies: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(),
-        description="Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed, with "
-        "commas between them",
+        description="Addresses or networks of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are "
+        "believed, with commas between them",
     )
     cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
         default=(), description="Origins whose pages may call the service, with commas between them"
@@ -98,7 +113,7 @@ class Settings(BaseSettings):
         default=OWN_CLUSTER,
         description="Head of the Ray cluster, `host:port`; `local`: one of this machine, started for it",
     )
-    ray_resources: dict[str, Annotated[float, Field(gt=0, allow_inf_nan=False)]] = Field(
+    ray_resources: Annotated[dict[str, Annotated[float, Field(gt=0, allow_inf_nan=False)]], NoDecode] = Field(
         default_factory=dict,
         description='What a worker on Ray needs, a JSON object such as `{"CPU": 1, "large": 1}`; default: a '
         "CPU for each thread of a job",
@@ -189,6 +204,40 @@ class Settings(BaseSettings):
         if self.no_keys and self.require_keys:
             raise ValueError("ALLOCATOR_NO_KEYS and ALLOCATOR_REQUIRE_KEYS exclude each other")
         return self
+
+    @field_validator("ray_resources", mode="before")
+    @classmethod
+    def _parse(cls, given: object) -> object:
+        if not isinstance(given, str):
+            return given
+        try:
+            return json.loads(given)
+        except ValueError as error:
+            raise ValueError(f"is no JSON: {error}") from error
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _are_origins(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        for each in given:
+            if each != _ANY and not _ORIGIN.fullmatch(each):
+                raise ValueError(f"{each!r} is no origin, such as https://maps.example or {_ANY}")
+        return given
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _are_names(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        for each in given:
+            if each != _ANY and not _HOST.fullmatch(each) and not _is_network(each.strip("[]")):
+                raise ValueError(f"{each!r} is no name of a host, without port and path")
+        return given
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _are_addresses(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        for each in given:
+            if each != _ANY and not _is_network(each):
+                raise ValueError(f"{each!r} is no address or network, such as 192.0.2.1")
+        return given
 
     @field_validator("cors_origins", "allowed_hosts", "trusted_proxies", mode="before")
     @classmethod

@@ -56,7 +56,7 @@ def install_dashboard(application: FastAPI, settings: Settings) -> None:
 
     Raises
     ------
-    OSError, ValueError
+    ValueError
         As :func:`app.api.overlay.install_overlay`.
     """
     tiles = urlsplit(settings.tile_url or "")

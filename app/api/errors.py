@@ -58,6 +58,7 @@ class MalformedJson(RequestError):
 
     def __init__(self, reason: str) -> None:
         super().__init__("malformed-json", said("the body is not JSON in UTF-8: {why}", why=reason))
+        self.reason = reason
 
 
 class InvalidBody(RequestError):

@@ -34,10 +34,14 @@ def install_overlay(application: FastAPI, path: Path) -> str:
 
     Raises
     ------
-    OSError, ValueError
-        As :func:`read_overlay` and :func:`~app.api.overlay_tiles.require_pictures`.
+    ValueError
+        It cannot be read, or as :func:`read_overlay` and :func:`~app.api.overlay_tiles.require_pictures`.
     """
-    if is_archive(path):
+    try:
+        archive = is_archive(path)
+    except OSError as error:
+        raise ValueError(f"{_called(path)} cannot be read: {error.strerror or error}") from error
+    if archive:
         require_pictures(path, _called(path))
 
         async def show_tiles(request: Request) -> Response:  # noqa: ARG001 - a route's signature

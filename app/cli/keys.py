@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from app.api.access.keys import Role, in_a_line
-from app.cli.common import DataDir, open_keys, read_settings, refusals
+from app.cli.common import DataDir, open_keys, read_settings, refusals, write_out
 
 
 def create_key(
@@ -18,7 +18,7 @@ def create_key(
     """Make a key and print it; it is not kept and cannot be shown again."""
     with refusals(), open_keys(read_settings(data_dir=data_dir)) as store:
         key, token = store.create(name, role)
-    typer.echo(token)
+    write_out(token)
     typer.echo(f"key {key.id} of the role {role} for {name!r}: this is the only time it is shown", err=True)
 
 
@@ -27,7 +27,7 @@ def list_keys(data_dir: DataDir = None) -> None:
     with open_keys(read_settings(data_dir=data_dir)) as store:
         for key in store.all():
             revoked = "in use" if key.revoked_at is None else f"revoked {key.revoked_at:%Y-%m-%d %H:%M}"
-            typer.echo(
+            write_out(
                 f"{key.id}\t{key.role}\t{key.created_at:%Y-%m-%d %H:%M}\t{revoked}\t{in_a_line(key.name)}"
             )
 

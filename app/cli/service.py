@@ -10,18 +10,26 @@ from typing import Annotated
 
 import typer
 from sqlalchemy import make_url
-from sqlalchemy.exc import SQLAlchemyError
 
 from app.api.access.keys import KeyStore
 from app.api.allocation_models import Allocation, AllocationRequest
 from app.api.allocation_payload import payload_of
 from app.api.body_validation import BodyValidator
+from app.api.errors import MalformedJson
 from app.api.evaluation_models import Evaluation, EvaluationRequest
 from app.api.evaluation_payload import evaluation_payload
 from app.api.json_body import parse_json
 from app.api.plan_formats.archive import texts_of
 from app.api.server import Server
-from app.cli.common import DataDir, open_keys, open_library, read_settings, refusals
+from app.cli.common import (
+    DataDir,
+    open_database,
+    open_keys,
+    open_library,
+    read_settings,
+    refusals,
+    write_out,
+)
 from app.cli.progress import bar
 from app.jobs import model
 from app.jobs.store import JobStore
@@ -32,12 +40,13 @@ from app.memory import limit_arenas
 from app.processors import usable_processors
 from app.settings import Settings
 from policy_store.backup import back_up
-from policy_store.database import Database
-from policy_store.errors import BackupFailed, PolicyStoreError
+from policy_store.errors import BackupFailed
 from policy_store.library import PolicyLibrary
 
 Host = Annotated[str | None, typer.Option(help="Address to listen on.")]
 Port = Annotated[int | None, typer.Option(help="Port to listen on.")]
+
+_CANNOT_START = "the service cannot start: "
 
 
 def serve(
@@ -64,7 +73,11 @@ def serve(
     _prepare(settings)
     configure_logs(settings.log_level)
     limit_arenas()
-    server = Server(settings)
+    try:
+        server = Server(settings)
+    except (OSError, ValueError) as error:
+        typer.echo(f"{_CANNOT_START}{error}", err=True)
+        raise typer.Exit(1) from None
     with suppress(KeyboardInterrupt):
         server.run()
     if not server.started:
@@ -73,19 +86,16 @@ def serve(
 
 def _prepare(settings: Settings) -> None:
     """Bring the database to this version, or end with what is in the way of that."""
-    try:
-        database = Database(settings.resolved_database_url)
+    with open_database(settings, _CANNOT_START) as database:
         try:
             # A newer version must not change what another service works on.
             database.occupy()
-            for store in (PolicyLibrary(database), KeyStore(database), JobStore(database, "migration", 1)):
+            library = PolicyLibrary(database)
+            for store in (library, KeyStore(database), JobStore(database, "migration", 1)):
                 store.migrate()
+            seed_library(library, database)
         finally:
             database.vacate()
-            database.dispose()
-    except (PolicyStoreError, SQLAlchemyError) as error:
-        typer.echo(f"the service cannot start: {getattr(error, 'orig', None) or error}", err=True)
-        raise typer.Exit(1) from None
 
 
 def allocate(
@@ -101,10 +111,10 @@ def allocate(
     settings = read_settings(data_dir=data_dir)
     with refusals():
         body = parse_json(sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes())
-        given = {"algorithm": algorithm, "seed": seed, "time_limit_s": time_limit_s}
-        given = {name: value for name, value in given.items() if value is not None}
+        options = {"algorithm": algorithm, "seed": seed, "time_limit_s": time_limit_s}
+        given: dict[str, object] = {name: value for name, value in options.items() if value is not None}
         if parameters is not None:
-            given["parameters"] = parse_json(parameters.encode("utf-8", "surrogateescape"))
+            given["parameters"] = _parsed("--parameters", parameters)
         if isinstance(body, dict):
             body |= given
         request = BodyValidator(AllocationRequest).validate(body, settings)
@@ -124,8 +134,15 @@ def allocate(
             context = WorkContext.in_process(report, time_limit_s=request.time_limit_s)
             result = tasks.allocate(payload, context).result
     answer = Allocation(job_id="", elapsed_s=time.monotonic() - started, **result)
-    written = answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True)
-    sys.stdout.write(written + "\n")
+    write_out(answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True))
+
+
+def _parsed(option: str, text: str) -> object:
+    """Read the JSON of an option, which is named where it is none."""
+    try:
+        return parse_json(text.encode("utf-8", "surrogateescape"))
+    except MalformedJson as error:
+        raise ValueError(f"{option} is not JSON: {error.reason}") from None
 
 
 def evaluate(
@@ -160,7 +177,7 @@ def evaluate(
         context = WorkContext.in_process(lambda _progress: None, time_limit_s=None)
         result = evaluating.evaluate(evaluation_payload(request, settings), context).result
     answer = Evaluation(job_id="", elapsed_s=time.monotonic() - started, **result)
-    sys.stdout.write(answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True) + "\n")
+    write_out(answer.model_dump_json(indent=2, exclude={"job_id"}, exclude_unset=True))
 
 
 def compile_code(

@@ -2206,11 +2206,13 @@ class WarningModel(TypedDict):
     code: Literal[
         "all_returning",
         "committed_beyond_steps",
+        "committed_in_vain",
         "coordinates_swapped",
         "deadline_passed",
         "degrees_on_plane",
         "earliest_after_deadline",
         "far_point",
+        "inside_zone",
         "never_available",
         "no_capacity",
         "no_level",
@@ -2222,6 +2224,7 @@ class WarningModel(TypedDict):
         "range_implausible",
         "range_spent",
         "speed_implausible",
+        "wind_too_strong",
         "waypoint_passed_over",
     ]
     """What it is, for programs."""

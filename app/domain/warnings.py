@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.domain.geometry import EARTH_RADIUS_KM, distances, unrolled
+from app.domain.hindrances import hindrances
 from app.domain.problem import TOLERANCE, Problem
 from app.domain.supplies import loads_later, most_loaded
 from app.domain.time_warnings import odd_times
@@ -25,11 +26,13 @@ Flags = npt.NDArray[np.bool_]
 CODES = (
     "all_returning",
     "committed_beyond_steps",
+    "committed_in_vain",
     "coordinates_swapped",
     "deadline_passed",
     "degrees_on_plane",
     "earliest_after_deadline",
     "far_point",
+    "inside_zone",
     "never_available",
     "no_capacity",
     "no_level",
@@ -41,6 +44,7 @@ CODES = (
     "range_implausible",
     "range_spent",
     "speed_implausible",
+    "wind_too_strong",
 )
 """Every code that a warning can have."""
 
@@ -123,7 +127,8 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
         M UAVs, N targets; it takes some 20 ms where M is 1000 and N is 2000.
     """
     scene = _scene(problem)
-    times = [warning for code, places in odd_times(problem) for warning in warnings_of(code, places)]
+    listed = (*odd_times(problem), *hindrances(problem))
+    times = (warning for code, places in listed for warning in warnings_of(code, places))
     found = [*_supplies(scene), *times, *_speeds_and_ranges(scene), *_levels(scene)]
     if problem.matrices is not None:
         # Positions are for display alone.
@@ -140,8 +145,9 @@ def problem_warnings(problem: Problem) -> tuple[ProblemWarning, ...]:
     # With a wind behind it a UAV gets farther than its range, and with bases on the way.
     plain = not problem.bases and (problem.wind is None or not problem.wind.speed)
     if plain and scene.ready.any() and scene.wanted.any() and not _anyone_in_range(scene):
-        says = "no UAV that can be sent has the range for any target that needs anything"
-        found.append(ProblemWarning("/uavs", "none_in_range", says + _and_back(problem)))
+        back = " and the way home" if problem.objective.return_to_base else ""
+        says = f"no UAV that can be sent has the range for any target that needs anything{back}"
+        found.append(ProblemWarning("/uavs", "none_in_range", says))
     return tuple(found)
 
 
@@ -219,10 +225,6 @@ def warnings_of(code: str, found: Sequence[tuple[str, str]]) -> Iterator[Problem
         more = len(found) - MOST
         tail = f"; so it is at {more} more places" if number == MOST and more > 0 else ""
         yield ProblemWarning(pointer, code, detail + tail)
-
-
-def _and_back(problem: Problem) -> str:
-    return " and the way home" if problem.objective.return_to_base else ""
 
 
 def _supplies(scene: _Scene) -> Iterator[ProblemWarning]:

@@ -19,6 +19,7 @@ from app.simulation.amounts_program import amounts_by_program, in_turn
 from app.simulation.arrays import Floats, Integers, ProblemArrays
 from app.simulation.deliveries import new_unloading
 from app.simulation.loads import serve_at_best
+from app.simulation.promised_amounts import keep_promises
 from app.simulation.visit_lists import visits_of
 from app.simulation.worth import satisfaction_of
 
@@ -43,8 +44,13 @@ def best_amounts(arrays: ProblemArrays, actions: Integers) -> Amounts:
     Returns
     -------
     Amounts
-        0 where there is no stop, and where one is of no use.
+        0 where there is no stop, and where one is of no use, but for a promised visit.
     """
+    return keep_promises(arrays, actions, _unpromised(arrays, actions))
+
+
+def _unpromised(arrays: ProblemArrays, actions: Integers) -> Amounts:
+    """Work the amounts out as if no visit had to unload anything."""
     by_flow = Amounts(_by_flow(arrays, actions), np.zeros((*actions.shape, arrays.shape[2])))
     if not arrays.terms["plans_loading"][0]:
         return by_flow

@@ -20,6 +20,7 @@ from app.simulation.amounts import Amounts
 from app.simulation.another_flight import NO_STEPS, another_flight
 from app.simulation.arrays import NONE, Floats, Integers, ProblemArrays
 from app.simulation.counterfactual import NO_VISIT, Counterfactuals, Outcome, relaxation_for
+from app.simulation.direct_flights import direct_flights_tell
 from app.simulation.flown_plan import FlownPlan, record_plan
 from app.simulation.from_start import Start, direct_rule, is_carried, look_from_start, needs_of
 from app.simulation.insertion import new_trial
@@ -138,9 +139,10 @@ class _Evaluator:
         if hard is not None:
             code, says, least = hard
             return self._unmet(j, code, says, uav=None if least is None else least.uav)
-        fastest = int(self._start.fastest[j])
-        says = self._says.not_looked(fastest, self._lookout.spent)
-        return self._unmet(j, UnmetCode.NOT_CHOSEN, says, uav=fastest, verified=False)
+        visitor = self._visitor(j)
+        able = int(self._start.fastest[j]) if visitor == NONE else visitor
+        says = self._says.not_looked(able, self._lookout.spent)
+        return self._unmet(j, UnmetCode.NOT_CHOSEN, says, uav=able, verified=False)
 
     def reason(self, j: int, places: Places) -> Unmet:
         """Say why target `j` does not get all it needs, and what would change it."""
@@ -152,6 +154,8 @@ class _Evaluator:
         carrier, fastest = int(self._start.carrier[j]), int(self._start.fastest[j])
         if carrier == NONE:
             return UnmetCode.NO_SUPPLY, self._says.no_supply(), None
+        if self._visitor(j) != NONE:
+            return None
         if fastest == NONE:
             missing = float(self._start.missing[j])
             if missing >= UNREACHABLE / 2:
@@ -187,6 +191,21 @@ class _Evaluator:
     def _carries(self, i: int, j: int) -> bool:
         """Whether UAV `i` can be sent and carries, now or from a base, what target `j` needs at the end."""
         return bool(is_carried(self._arrays, self._plan, i, j))
+
+    def _visitor(self, j: int) -> int:
+        """UAV that the plan sends to target `j` in spite of what a direct flight says; NONE where none."""
+        if direct_flights_tell(self._problem):
+            return NONE
+        there = (uav for uav, _ in self._visits(j) if self._carries(uav, j))
+        return next(there, NONE)
+
+    def _visits(self, j: int) -> Iterator[tuple[int, int]]:
+        """UAV and place in its route of each visit that the plan makes to target `j`."""
+        visits, m = self._plan.visits, self._arrays.shape[0]
+        slot = int(visits.first[j])
+        while slot != NONE:
+            yield slot % m, slot // m
+            slot = int(visits.following[slot])
 
     def _is_cut_off(self, j: int) -> bool:
         """Whether no leg at all leads to target `j`: then it is not the wind alone."""
@@ -281,25 +300,26 @@ class _Evaluator:
         """Visits with what is left over that gain once range, time or steps are there."""
         for lack in _RELAXED:
             i, place = int(places.uav[lack]), int(places.place[lack])
-            if i != NONE and places.gain[lack] > 0 and isinstance(self._lookout, Lookout):
-                step, more_range, late = self._lookout.lacking(i, place, j)
-                yield _Remedy(i, place, relaxation_for(self._problem, None, more_range, int(step), late))
+            if i != NONE and places.gain[lack] > 0:
+                yield from self._eased(i, place, j)
 
     def _reloaded(self, j: int, places: Places) -> Iterator[_Remedy]:
         """Visits of the plan, then additional ones, that bring what is missing with more aboard."""
         if isinstance(self._lookout, SpareLookout):
             return
-        visits, m = self._plan.visits, self._arrays.shape[0]
-        slot = int(visits.first[j])
-        while slot != NONE:
-            i, place = slot % m, slot // m
+        visits = self._plan.visits
+        for i, place in self._visits(j):
             yield _Remedy(i, place, relaxation_for(self._problem, self._more_load(i, place, j)), new=False)
-            slot = int(visits.following[slot])
         for i, place in zip(places.loader.tolist(), places.loader_place.tolist(), strict=True):
             there = place < int(visits.length[i]) and int(visits.target[i, place]) == j
             if i != NONE and not there:
-                step, more_range, late = self._lookout.lacking(i, place, j)
-                more_load = self._more_load(i, place, j)
+                yield from self._eased(i, place, j, self._more_load(i, place, j))
+
+    def _eased(self, i: int, place: int, j: int, more_load: Floats | None = None) -> Iterator[_Remedy]:
+        """A visit with what it lacks; none where that is a leg, for which no range makes up."""
+        if isinstance(self._lookout, Lookout):
+            step, more_range, late = self._lookout.lacking(i, place, j)
+            if more_range < UNREACHABLE / 2:
                 yield _Remedy(i, place, relaxation_for(self._problem, more_load, more_range, int(step), late))
 
     def _more_load(self, i: int, place: int, j: int) -> Floats:

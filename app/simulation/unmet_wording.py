@@ -7,6 +7,7 @@ from app.domain.clock import clock
 from app.domain.problem import Problem
 from app.domain.units import DISTANCE, SPEED, TIME, Unit
 from app.simulation import shortfalls
+from app.simulation.direct_flights import direct_flights_tell
 from app.simulation.flown_plan import FlownPlan
 from app.simulation.from_start import DirectNeeds
 from app.simulation.visit import RULES
@@ -31,6 +32,8 @@ class Wording:
 
     def __init__(self, problem: Problem, plan: FlownPlan) -> None:
         self._problem, self._plan = problem, plan
+        # Of a flight that is not direct nothing is known where it might do better.
+        self._there = "" if direct_flights_tell(problem) else " on a direct flight"
         # Numbers of Python's are much quicker to write than numpy's.
         self._remaining = plan.remaining.tolist()
 
@@ -78,20 +81,26 @@ class Wording:
 
     def endurance(self, i: int, needed: float) -> str:
         """Too long in the air, even directly."""
-        return f"{self._uav(i)} would be in the air for {self._time(needed)}, and has {self._usable(i)}"
+        return (
+            f"{self._uav(i)} would be in the air for {self._time(needed)}{self._there}, "
+            f"and has {self._usable(i)}"
+        )
 
     def too_early_to_wait(self, i: int, j: int, needs: DirectNeeds) -> str:
         """It opens too late to wait for."""
         opens = self._problem.targets[j].earliest
         return (
             f"it opens at {self._time(opens)}: {self._uav(i)} would be in the air for "
-            f"{self._time(needs.aloft)}, {self._time(needs.waiting)} of it waiting, and has {self._usable(i)}"
+            f"{self._time(needs.aloft)}{self._there}, {self._time(needs.waiting)} of it waiting, "
+            f"and has {self._usable(i)}"
         )
 
     def available_until(self, i: int, landing: float) -> str:
         """It would land too late, even directly."""
         until = self._time(self._problem.uavs[i].available_until or 0.0)
-        return f"{self._uav(i)} would land at {self._time(landing)}, and is available until {until}"
+        return (
+            f"{self._uav(i)} would land at {self._time(landing)}{self._there}, and is available until {until}"
+        )
 
     def blocked(self, i: int, place: int, rule: int) -> str:
         """A UAV with something left over must not fly there, whatever range, time and steps it has."""
@@ -109,7 +118,7 @@ class Wording:
     def out_of_range(self, i: int, lacks: float) -> str:
         """Nobody has the range; UAV `i` comes closest."""
         return (
-            f"no UAV that carries any of it has the range: {self._uav(i)} comes closest "
+            f"no UAV that carries any of it has the range{self._there}: {self._uav(i)} comes closest "
             f"and lacks {self._length(lacks)}"
         )
 
@@ -117,7 +126,7 @@ class Wording:
         """Nobody can be in time; UAV `i` would be there first."""
         return (
             f"the fastest UAV that could serve it, {self._uav(i)}, "
-            f"would arrive {self._time(late)} after its deadline"
+            f"would arrive {self._time(late)} after its deadline{self._there}"
         )
 
     def not_looked(self, i: int, spent: bool) -> str:

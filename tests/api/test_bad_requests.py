@@ -88,6 +88,21 @@ def test_field_is_refused_where_it_is(client, problem, path, value, pointer):
     assert all(error["detail"] for error in refused["errors"])
 
 
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        ("seed", 2**53, "is 9007199254740992, must be at most 9007199254740991"),
+        ("uavs/0/speed", "3", "is a text, needs a number"),
+        ("max_steps", "3", "is a text, needs a whole number"),
+        ("uavs/0/x_s", 1e13, "is 10000000000000, must be at most 1000000000000"),
+    ],
+)
+def test_a_number_is_said_as_it_is_and_a_text_is_no_number(client, problem, path, value, says):
+    refused = client.post("/allocate", json=changed(problem, path, value)).json()
+
+    assert says in [error["detail"] for error in refused["errors"]]
+
+
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", HUGE])
 def test_number_that_is_not_finite(client, problem, number):
     text = json.dumps(changed(problem, "uavs/0/voyage", "HERE")).replace('"HERE"', number)

@@ -52,6 +52,36 @@ def test_nonsense_is_refused(name, value):
         Settings(**{name: value})
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("trusted_proxies", "192.0.2.1, proxy.example", "'proxy.example' is no address or network"),
+        ("cors_origins", "maps.example", "'maps.example' is no origin"),
+        ("cors_origins", "https://maps.example/page", "'https://maps.example/page' is no origin"),
+        ("allowed_hosts", "https://relief.example", "'https://relief.example' is no name of a host"),
+        ("allowed_hosts", "relief.example:8000", "'relief.example:8000' is no name of a host"),
+        ("ray_resources", "{", "is no JSON"),
+    ],
+)
+def test_what_would_never_match_is_refused(monkeypatch, name, value, says):
+    monkeypatch.setenv(f"ALLOCATOR_{name.upper()}", value)
+    with pytest.raises(ValidationError, match=re.escape(says)):
+        Settings()
+
+
+def test_names_addresses_and_networks_are_taken(monkeypatch):
+    for name, value in {
+        "TRUSTED_PROXIES": "192.0.2.1,2001:db8::/32",
+        "CORS_ORIGINS": "https://maps.example:8000,http://localhost",
+        "ALLOWED_HOSTS": "relief.example,[::1]",
+        "RAY_RESOURCES": '{"CPU": 2}',
+    }.items():
+        monkeypatch.setenv(f"ALLOCATOR_{name}", value)
+    settings = Settings()
+    assert settings.trusted_proxies == ("192.0.2.1", "2001:db8::/32")
+    assert settings.ray_resources == {"CPU": 2.0}
+
+
 def test_null_keeps_jobs_for_ever(monkeypatch):
     assert Settings().job_retention_s == 30 * 86_400
     monkeypatch.setenv("ALLOCATOR_JOB_RETENTION_DAYS", "null")

@@ -119,3 +119,33 @@ def test_features_are_read_as_they_are_found(read):
 )
 def test_a_map_that_cannot_be_read_is_refused_with_its_feature(read, content, message):
     assert read(content) == {"refused": message}
+
+
+ACROSS = [[179, -17], [-179, -17], [-179, -15], [179, -15], [179, -17]]
+
+
+def test_the_middle_of_an_area_over_the_antimeridian_lies_in_it(read):
+    found = read(collection(feature({"type": "Polygon", "coordinates": [ACROSS]})))["problem"]["targets"]
+    assert (abs(found[0]["x"]), found[0]["y"]) == (180, -16)
+    plane = {"crs": "local"}
+    found = read(collection(feature({"type": "Polygon", "coordinates": [ACROSS]}), settings=plane))
+    assert found["problem"]["targets"][0]["x"] == pytest.approx(0)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "says"),
+    [
+        ({"type": "MultiPolygon", "coordinates": 5}, "feature 1 is an empty MultiPolygon"),
+        ({"type": "Polygon", "coordinates": "ring"}, "feature 1 is an empty Polygon"),
+        ({"type": ["Point"]}, 'feature 1 is a ["Point"]: a UAV, an area or a base is one point'),
+        ({}, "feature 1 is a null: a UAV, an area or a base is one point"),
+    ],
+)
+def test_geometries_that_are_none_are_refused_and_what_is_no_name_names_nothing(read, geometry, says):
+    assert read(collection(feature(geometry, properties={"id": {}, "name": {"en": "A"}})))["refused"] == says
+
+
+def test_xml_is_told_from_a_table(read):
+    says = "this is XML, as KML, GPX and web pages are: save it as GeoJSON or CSV"
+    for text in ('<?xml version="1.0"?><kml></kml>', '\n<gpx version="1.1"></gpx>', "<!DOCTYPE html>"):
+        assert read(text) == {"refused": says}

@@ -124,3 +124,34 @@ def test_every_page_has_an_icon(shared_page, service):
     answer = page.request.get(f"{service.url}/favicon.ico")
     assert answer.status == 200
     assert re.match("image/svg", answer.headers["content-type"])
+
+
+def test_another_map_while_the_first_one_zooms_leaves_no_error(page):
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    ready(page)
+    page.evaluate("""() => new Promise((resolve) => {
+        document.querySelector(".leaflet-control-zoom-in").click();
+        setTimeout(() => {
+            const crs = document.querySelector("select[name=crs]");
+            crs.value = crs.value === "local" ? "wgs84" : "local";
+            crs.dispatchEvent(new Event("change", { bubbles: true }));
+            setTimeout(resolve, 600);
+        }, 120);
+    })""")
+    assert errors == []
+
+
+def test_keys_before_the_map_is_made_leave_no_error(page):
+    errors, held = [], []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.route("**/dashboard/settings.json", lambda route: held.append(route))  # noqa: PLW0108
+    with page.expect_request("**/dashboard/settings.json"):
+        page.reload(wait_until="commit")
+    page.keyboard.press("Escape")
+    page.keyboard.press("Control+z")
+    for route in held:
+        route.continue_()
+    page.unroute("**/dashboard/settings.json")
+    ready(page)
+    assert errors == []

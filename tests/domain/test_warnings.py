@@ -13,7 +13,7 @@ from app.api.problem_models import ProblemModel, to_problem
 from app.domain.geometry import distance
 from app.domain.matrices import Matrix
 from app.domain.problem import UAV, Objective, Problem, Target
-from app.domain.surroundings import Base, Wind
+from app.domain.surroundings import Base, NoFlyZone, Wind
 from app.domain.warnings import CODES, problem_warnings
 from app.settings import Settings
 from app.simulation.generator import FAMILIES, generate
@@ -71,6 +71,31 @@ TROUBLES = {
         replace(with_uavs(scene(), lambda u: {"committed": ("area-2", "area-1")}, 1), max_steps=1),
         "/uavs/1/committed",
         "2 visits are promised of 'uav-2', in 1 steps",
+    ),
+    "committed_in_vain": (
+        with_targets(
+            with_uavs(scene(), lambda u: {"committed": ("area-2", "area-1")}, 1),
+            lambda t: {"skills": ("crane",)},
+            0,
+        ),
+        "/uavs/1/committed/1",
+        "'uav-2' makes no visit before that of 'area-1', which is promised, and cannot make it: "
+        "it has not the skills crane",
+    ),
+    "inside_zone": (
+        replace(
+            with_uavs(scene(), lambda u: {"x_c": 34.75, "y_c": -19.75}, 1),
+            no_fly_zones=(
+                NoFlyZone("airport", ((34.7, -19.8), (34.8, -19.8), (34.8, -19.7), (34.7, -19.7))),
+            ),
+        ),
+        "/uavs/1/x_c",
+        "the position of 'uav-2' lies in the no-fly zone 'airport'",
+    ),
+    "wind_too_strong": (
+        replace(with_uavs(scene(), lambda u: {"speed": 40.0}, 1), wind=Wind(40.0, 90.0)),
+        "/uavs/1/speed",
+        "'uav-2' flies 40, no faster than the wind, 40",
     ),
     "earliest_after_deadline": (
         with_targets(scene(), lambda t: {"deadline": 2.0, "earliest": 2.5}, 4),
@@ -146,6 +171,34 @@ def test_a_warning_names_the_place_and_nothing_else_is_said(code):
     (warning,) = problem_warnings(problem)
     assert (warning.code, warning.pointer) == (code, pointer)
     assert said in warning.detail
+
+
+@pytest.mark.parametrize(
+    ("of_uav", "of_area", "why"),
+    [
+        ({}, {"loadlist": (0.0, 0.0)}, "that needs nothing"),
+        ({"loadlist": (0.0, 5.0)}, {"loadlist": (2.0, 0.0)}, "it carries nothing that is needed there"),
+        ({"available_from": 2.0}, {"deadline": 1.0}, "the deadline there is 1, and it takes off at 2"),
+        ({"voyage": 40.0, "reserve": 0.5}, {}, "it would have flown 37.2283 there, and may fly 20"),
+    ],
+)
+def test_why_a_promised_visit_cannot_be_made(of_uav, of_area, why):
+    promised = with_uavs(scene(), lambda u: {"committed": ("area-1",), **of_uav}, 0)
+    (warning,) = [
+        each
+        for each in problem_warnings(with_targets(promised, lambda t: of_area, 0))
+        if each.code == "committed_in_vain"
+    ]
+    assert warning.pointer == "/uavs/0/committed/0"
+    assert warning.detail.endswith(why)
+
+
+def test_promises_that_can_be_kept_and_borders_of_zones_are_nothing_to_warn_of():
+    promised = with_uavs(scene(), lambda u: {"committed": ("area-1", "area-2")}, 0)
+    assert codes(promised) == []
+    edge = NoFlyZone("z", ((34.84, -19.83), (34.9, -19.83), (34.9, -19.9), (34.84, -19.9)))
+    assert codes(replace(scene(), no_fly_zones=(edge,))) == []
+    assert codes(replace(with_uavs(scene(), lambda u: {"ret": 1}, 0), wind=Wind(79.0, 0.0))) == []
 
 
 def test_with_a_wind_behind_it_a_uav_may_get_farther_than_its_range():

@@ -28,7 +28,7 @@ import "./views/index.js";
 const FIRST_EXAMPLE = "cyclone-idai";
 const LOOK_AGAIN_MS = 10_000;
 const byId = (id) => document.getElementById(id);
-let map;
+let map; // made once the page has been loaded
 let missing = false; // what the service offers is not known, as it could not be asked
 
 /** Show a view, mounting it the first time. */
@@ -132,12 +132,12 @@ function onKeys(event) {
   const command = event.ctrlKey || event.metaKey;
   if (command && event.key.toLowerCase() === "z" && !typing) {
     event.preventDefault();
-    if (map.drawing && !event.shiftKey) map.drawing.takeBack();
+    if (map?.drawing && !event.shiftKey) map.drawing.takeBack();
     else (event.shiftKey ? redo : undo)();
   } else if (command && event.key === "Enter") {
     planNow();
   } else if (event.key === "Escape" && !typing) {
-    map.stopPlacing();
+    map?.stopPlacing();
     set({ selection: null });
   } else if (event.key === "?" && !typing && !event.target.closest("table[role=grid]")) {
     event.preventDefault();

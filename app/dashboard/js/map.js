@@ -137,6 +137,8 @@ export class DispatchMap {
 
   #make(crs) {
     this.stopPlacing();
+    // Leaflet ends a zoom under way after the map has gone, and finds nothing left of it.
+    if (this.map) this.map._animatingZoom = false;
     this.map?.remove();
     const { settings } = get();
     const globe = crs === "wgs84";

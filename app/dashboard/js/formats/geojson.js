@@ -73,7 +73,7 @@ export function fromGeoJson(collection, present, fields) {
       else foreign.add(field);
     }
     const id = feature.id ?? properties.id;
-    if (id !== undefined && id !== null) item.id = String(id);
+    if (isName(id)) item.id = String(id);
     const onEarth = ([x, y]) => {
       if (!settings && !(Math.abs(x) <= 180 && Math.abs(y) <= 90)) throw new FormatError(t("{feature} is at {place}: these are no degrees of longitude and latitude", { feature: name, place: `${x}, ${y}` }));
       return [x, y];
@@ -84,7 +84,7 @@ export function fromGeoJson(collection, present, fields) {
       (problem[ZONES] ??= []).push({ ...item, polygon: settings ? polygon : polygon.map((corner) => onEarth(pair(corner, name))) });
       return;
     }
-    const [x, y] = onEarth(placeOf(feature.geometry, name, notices));
+    const [x, y] = onEarth(placeOf(feature.geometry, name, notices, !settings || settings.crs === "wgs84"));
     (problem[kind] ??= []).push(placed(kind, item, x, y));
   });
   if (foreign.size) notices.push(t("Attributes that are no fields of a problem were left out: {attributes}", { attributes: [...foreign].join(", ") }));
@@ -97,9 +97,13 @@ function placed(kind, item, x, y) {
   return { ...item, [item.x_c === undefined ? "x_s" : "x_c"]: x, [item.y_c === undefined ? "y_s" : "y_c"]: y };
 }
 
+function isName(value) {
+  return ["string", "number"].includes(typeof value);
+}
+
 export function nameOf(feature, at) {
   const { id, name, Name, NAME } = feature?.properties ?? {};
-  const called = [feature?.id, id, name, Name, NAME].find((each) => each !== undefined && each !== null && each !== "");
+  const called = [feature?.id, id, name, Name, NAME].find((each) => isName(each) && each !== "");
   const row = rowText("feature", at + 1);
   return called === undefined ? row : `${row} (${called})`;
 }
@@ -113,7 +117,7 @@ export function onGlobe(crs) {
 
 /** The corners of a zone, without the last one, which closes the ring. */
 function cornersOf({ type, coordinates }, name) {
-  if (type !== "Polygon" || !Array.isArray(coordinates?.[0])) throw new FormatError(t("{feature} is a {type}: a zone is one Polygon", { feature: name, type }));
+  if (type !== "Polygon" || !Array.isArray(coordinates?.[0])) throw new FormatError(t("{feature} is a {type}: a zone is one Polygon", { feature: name, type: typeText(type) }));
   const [ring, ...holes] = coordinates;
   if (holes.length) throw new FormatError(tn(holes.length, "{feature} has {count} hole: a zone has none", "{feature} has {count} holes: a zone has none", { feature: name }));
   return ring.length > 1 && same(ring[0], ring.at(-1)) ? ring.slice(0, -1) : ring;
@@ -130,19 +134,24 @@ function listOf(value, schema) {
   }
 }
 
-/** Where a feature is; of a polygon the middle, which is said. */
-export function placeOf({ type, coordinates }, name, notices) {
+/** Where a feature is; of a polygon the middle, which is said. @param {boolean} globe whether its coordinates are degrees */
+export function placeOf({ type, coordinates }, name, notices, globe) {
+  const parts = Array.isArray(coordinates) ? coordinates : [];
   if (type === "Point") return pair(coordinates, name);
-  if (type === "MultiPoint" && coordinates?.length === 1) return pair(coordinates[0], name);
+  if (type === "MultiPoint" && parts.length === 1) return pair(parts[0], name);
   if (type === "Polygon" || type === "MultiPolygon") {
-    const rings = (type === "Polygon" ? [coordinates?.[0]] : (coordinates ?? []).map((polygon) => polygon?.[0])).filter((ring) => ring?.length);
+    const rings = (type === "Polygon" ? [parts[0]] : parts.map((polygon) => polygon?.[0])).filter((ring) => Array.isArray(ring) && ring.length);
     if (!rings.length) throw new FormatError(t("{feature} is an empty {type}", { feature: name, type }));
-    const middles = rings.map((ring) => middleOf(ring.map((place) => pair(place, name))));
+    const middles = rings.map((ring) => middleOf(ring.map((place) => pair(place, name)), globe));
     notices.push(t("{feature} is a {type}: its middle was taken", { feature: name, type }));
     return middles.reduce((a, b) => (b.area > a.area ? b : a)).place;
   }
-  if (type === "MultiPoint") throw new FormatError(t("{feature} is a MultiPoint of {count} points: a UAV, an area or a base is one point", { feature: name, count: coordinates?.length ?? 0 }));
-  throw new FormatError(t("{feature} is a {type}: a UAV, an area or a base is one point", { feature: name, type }));
+  if (type === "MultiPoint") throw new FormatError(t("{feature} is a MultiPoint of {count} points: a UAV, an area or a base is one point", { feature: name, count: parts.length }));
+  throw new FormatError(t("{feature} is a {type}: a UAV, an area or a base is one point", { feature: name, type: typeText(type) }));
+}
+
+function typeText(type) {
+  return typeof type === "string" ? type : JSON.stringify(type ?? null);
 }
 
 function pair(coordinates, name) {
@@ -152,7 +161,8 @@ function pair(coordinates, name) {
 }
 
 /** The centroid of a ring and its area; of one without an area the mean of its corners. */
-function middleOf(ring) {
+function middleOf(given, globe) {
+  const ring = globe ? unrolled(given) : given;
   const [[x0, y0]] = ring;
   let [area, sx, sy] = [0, 0, 0];
   ring.forEach(([ax, ay], at) => {
@@ -163,6 +173,16 @@ function middleOf(ring) {
     sy += part * (ay + by - 2 * y0);
   });
   const mean = (axis) => ring.reduce((sum, corner) => sum + corner[axis], 0) / ring.length;
-  const place = area ? [x0 + sx / (3 * area), y0 + sy / (3 * area)] : [mean(0), mean(1)];
+  const [x, y] = area ? [x0 + sx / (3 * area), y0 + sy / (3 * area)] : [mean(0), mean(1)];
+  const place = [globe ? x - 360 * Math.round(x / 360) : x, y];
   return { area: Math.abs(area), place: place.map((value) => Number(value.toFixed(7))) };
+}
+
+/** A ring whose sides are the shorter way round: one over the antimeridian goes on beyond 180. */
+function unrolled(ring) {
+  let before = ring[0][0];
+  return ring.map(([x, y]) => {
+    before = x + 360 * Math.round((before - x) / 360);
+    return [before, y];
+  });
 }

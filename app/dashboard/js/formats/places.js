@@ -58,7 +58,7 @@ function featureSheet(text) {
       notices.push(t("{feature} has no geometry and was left out", { feature: nameOf(feature, at) }));
       return [];
     }
-    const place = placeOf(feature.geometry, nameOf(feature, at), notices);
+    const place = placeOf(feature.geometry, nameOf(feature, at), notices, true);
     return [{ line: at + 1, cells: [...place, ...properties.map((name) => feature.properties?.[name] ?? "")].map(cellText) }];
   });
   return { columns: ["longitude", "latitude", ...properties], rows, separator: ";", row: "feature", globe: true, notices };

@@ -29,7 +29,9 @@ export function textOf(bytes) {
     }
   }
   if (text.includes("\0")) throw new FormatError(t("this is no text in UTF-8, UTF-16 or Windows-1252"));
-  return { text: text.replace(/^\uFEFF/, ""), notices };
+  text = text.replace(/^\uFEFF/, "");
+  if (/^\s*<[?!a-z]/i.test(text)) throw new FormatError(t("this is XML, as KML, GPX and web pages are: save it as GeoJSON or CSV"));
+  return { text, notices };
 }
 
 /** UTF-16 without a mark: every second byte of plain text is zero. */
