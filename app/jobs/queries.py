@@ -71,8 +71,8 @@ class Database(Protocol):
     def read(self) -> AbstractContextManager[Connection]:
         """Open a read transaction."""
 
-    def migrate(self, script_location: Path, version_table: str) -> None:
-        """Bring the tables of an Alembic folder to its newest version."""
+    def migrate(self, folder: Path, version_table: str) -> None:
+        """Bring tables to the newest version of a folder of Alembic migrations."""
 
     def take_turn(self, connection: Connection, name: str) -> None:
         """Let the transactions that call this with one name follow one another."""
