@@ -21,7 +21,7 @@ from app.jobs.attempts import REMEMBERED_DURATIONS, Attempt, Attempts, Writer, c
 from app.jobs.clock import Loop
 from app.jobs.errors import Draining, UnknownJobKind
 from app.jobs.events import EventStreams
-from app.jobs.executor import Execution, Executor
+from app.jobs.executor import Executor
 from app.jobs.maintenance import Maintenance
 from app.jobs.model import LANES, Idempotency, Job, JobObserver, JobStatus, Lane, Load
 from app.jobs.peers import Peers
@@ -188,7 +188,7 @@ class Dispatcher:
         if before is JobStatus.QUEUED:
             self.moved(job)
         elif before is JobStatus.RUNNING and (attempt := self.attempts.of(job_id)) is not None:
-            self.stop_attempt(attempt)
+            attempt.stop()
         elif before is JobStatus.RUNNING:
             self._peers.tell("cancelled", job_id)
         return self.attempts.newest(job)
@@ -231,10 +231,6 @@ class Dispatcher:
         took = None if ran_s is None else round(ran_s, 4)
         _log.info("job ended", extra={**about, "reason": reason, "ran_s": took})
 
-    def stop_attempt(self, attempt: Attempt) -> None:
-        """Stop an attempt whose job is to be cancelled."""
-        attempt.stop(self._grace_s)
-
     def look(self) -> None:
         """Look at all that waits in the table, of which nothing may have been told here."""
         self._look_for_one()
@@ -252,7 +248,7 @@ class Dispatcher:
             case "ended" if (events := self.events.known(of)) is not None:
                 events.notify()
             case "cancelled" if (attempt := self.attempts.of(of)) is not None:
-                self.stop_attempt(attempt)
+                attempt.stop()
             case "":
                 self.look()
                 self.events.notify()
@@ -286,38 +282,23 @@ class Dispatcher:
 
         So a cancellation, which is committed after it, finds it among the attempts.
         """
-        kind, now = self._kinds[job.kind], self._store.clock.now()
-        executor, work = self._executor, kind.work
-        if at_once and kind.at_once is not None:
-            executor, work = self._executors[-1], kind.at_once
-        attempt = Attempt(job, self.events.open(job.id), job.progress, now, at_once=at_once)
+        kind, events, now = self._kinds[job.kind], self.events.open(job.id), self._store.clock.now()
+        executor = self._executors[-1] if at_once else self._executor
+        attempt = Attempt(job, kind, events, executor, now, self._grace_s, at_once)
         self.attempts.add(attempt)
         if self._observer is not None and job.attempt == 1 and job.started_at is not None:
             self._observer.started(job, max(0.0, (job.started_at - job.created_at).total_seconds()))
-        left = None if job.deadline is None else job.deadline - now
-        attempt.execution = executor.submit(
-            work, attempt.payload, time_left_s=left, on_progress=attempt.report, labels=job.labels
-        )
-        loop = asyncio.get_running_loop()
-        if left is not None:
-            attempt.timers.append(
-                loop.call_later(max(0.0, left) + self._grace_s, attempt.end_overdue, self._grace_s)
-            )
-        if kind.max_run_s is not None:
-            attempt.timers.append(loop.call_later(kind.max_run_s, attempt.stop, self._grace_s, "time"))
-        return _spawn(self._finish(attempt, attempt.execution), self._finishing)
+        return _spawn(self._finish(attempt), self._finishing)
 
-    async def _finish(self, attempt: Attempt, execution: Execution) -> None:
+    async def _finish(self, attempt: Attempt) -> None:
         """Wait for the outcome of a job and store it; its worker stays reserved until that is on disk."""
         bind_contextvars(**attempt.job.labels)
         begun, took = time.monotonic(), 0.0
         job: Job | None = None
         try:
-            outcome = await execution.outcome()
+            outcome = await attempt.outcome()
             took = time.monotonic() - begun
-            for timer in attempt.timers:
-                timer.cancel()
-            job = await complete(attempt, outcome, self._store, self._writer, self._grace_s)
+            job = await complete(attempt, outcome, self._store, self._writer)
         except Exception:
             _log.exception("a job's end could not be stored; once something can be, it is given back")
             self._maintenance.unsettled.append(attempt)

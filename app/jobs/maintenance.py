@@ -105,7 +105,7 @@ class Maintenance:
                 _log.warning("a job was taken from this service", extra={"job_id": attempt.job.id})
                 attempt.kill("gone")
             elif mine.cancel_requested:
-                self._dispatcher.stop_attempt(attempt)
+                attempt.stop()
         known = {each.job.id for each in (*before, *self._attempts, *self.unsettled)}
         for job_id in owned.keys() - known:
             # It was taken in a commit of which this service never learned.

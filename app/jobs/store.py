@@ -25,7 +25,7 @@ from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull, failure
 from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
-from app.jobs.queries import Database, JobQueries
+from app.jobs.queries import Database, JobQueries, is_queued
 from app.jobs.stored_json import read_later
 from app.jobs.tables import DATABASE_NOW, artifacts, idempotency_keys, jobs
 
@@ -33,12 +33,12 @@ MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
 _UNFINISHED = JobStatus.QUEUED, JobStatus.RUNNING
-_QUEUED, _RUNNING = jobs.c.status == JobStatus.QUEUED, jobs.c.status == JobStatus.RUNNING
+_RUNNING = jobs.c.status == JobStatus.RUNNING
 # Of each lane the job that has waited longest; one that another dispatcher is about to take is passed over,
 # where they do not take turns.
 _OLDEST = {
     lane: sa.select(jobs.c.number)
-    .where(_QUEUED, jobs.c.lane == lane)
+    .where(is_queued, jobs.c.lane == lane)
     .order_by(jobs.c.number)
     .limit(1)
     .with_for_update(skip_locked=True)
@@ -137,7 +137,7 @@ class JobStore(JobQueries):
             if not (self.database.shared or _is_there(connection, jobs.c.status.in_(_UNFINISHED))):
                 self.clock.follow()
             before = jobs.c.lane.in_(LANES[: LANES.index(kind.lane) + 1])
-            if not run_now or _is_there(connection, _QUEUED, before):
+            if not run_now or _is_there(connection, is_queued, before):
                 run_now = False
                 self.database.take_turn(connection, f"queue {kind.lane}")
                 if queries.waiting_in(connection, kind.lane) >= places:
@@ -181,7 +181,7 @@ class JobStore(JobQueries):
             # An earlier process may have had another idea of the time.
             started_at = sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now)
             begins = {"status": JobStatus.RUNNING, "attempt": jobs.c.attempt + 1, "owner": self.owner}
-            take = sa.update(jobs).where(which, _QUEUED).values(**begins, started_at=started_at)
+            take = sa.update(jobs).where(which, is_queued).values(**begins, started_at=started_at)
             rows = connection.execute(take.returning(*queries.whole, queries.has_artifact)).mappings().all()
             if not rows:
                 connection.rollback()  # nothing is there to be committed
@@ -296,23 +296,20 @@ class JobStore(JobQueries):
         list of Job
             Every job that was changed.
         """
-        stranger = _QUEUED, jobs.c.kind.not_in(list(self.kinds))
         with self.database.read() as connection:
             owners = connection.scalars(sa.select(jobs.c.owner).where(_RUNNING).distinct()).all()
-            strangers = connection.scalar(sa.select(sa.func.count()).where(*stranger))
-        dead = [owner for owner in owners if not alive(owner)]
-        changed: list[Job] = []
-        if not dead and not strangers:
-            return changed
+        left = sa.and_(_RUNNING, jobs.c.owner.in_([owner for owner in owners if not alive(owner)]))
+        stranger = sa.and_(is_queued, jobs.c.kind.not_in(list(self.kinds)))
         with self.database.write() as connection:
-            left = queries.select_to_change.where(_RUNNING, jobs.c.owner.in_(dead))
-            for row in connection.execute(left).mappings().all():
-                reason = "the service stopped in its midst"
-                changed.append(self._move(connection, row, JobStatus.QUEUED, crash=reason))
-            for row in connection.execute(queries.select_to_change.where(*stranger)).mappings().all():
-                error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
-                changed.append(self._move(connection, row, JobStatus.FAILED, error=error))
-        return changed
+            rows = connection.execute(queries.select_to_change.where(sa.or_(left, stranger))).mappings().all()
+            return [self._give_back(connection, row) for row in rows]
+
+    def _give_back(self, connection: Connection, row: RowMapping) -> Job:
+        if row["status"] == JobStatus.RUNNING:
+            reason = "the service stopped in its midst"
+            return self._move(connection, row, JobStatus.QUEUED, crash=reason)
+        error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
+        return self._move(connection, row, JobStatus.FAILED, error=error)
 
     def complete_result(
         self, job_id: str, attempt: int, fields: Mapping[str, Any], *, failed: bool = False
