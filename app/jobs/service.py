@@ -10,10 +10,12 @@ import time
 import uuid
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from app.jobs.clock import Clock, wait_for
 from app.jobs.dispatcher import Dispatcher
+from app.jobs.errors import UnknownJobKind
 from app.jobs.executor import Executor
 from app.jobs.model import (
     LANES,
@@ -30,6 +32,7 @@ from app.jobs.model import (
 )
 from app.jobs.queries import Database
 from app.jobs.store import JobStore
+from app.logs import labels
 
 # A waiter may miss the news of a job that another process runs, and looks at the table.
 _LOOK_AGAIN_S = 5.0
@@ -85,20 +88,12 @@ class JobService:
         observer: JobObserver | None = None,
         lease_s: float = 15.0,
     ) -> None:
-        places = dict.fromkeys(LANES, max_queued if isinstance(max_queued, int) else _PLACES)
-        places = places if isinstance(max_queued, int) else {**places, **max_queued}
+        some = dict.fromkeys(LANES, max_queued) if isinstance(max_queued, int) else max_queued
+        self._places = {**dict.fromkeys(LANES, _PLACES), **some}
         owner = f"{platform.node()}:{os.getpid()}:{uuid.uuid4().hex[:12]}"
         self._store = JobStore(database, owner, max_attempts, kinds, Clock())
-        self._dispatcher = Dispatcher(
-            self._store,
-            executor,
-            reserve,
-            observer,
-            places=places,
-            overrun_grace_s=overrun_grace_s,
-            retention_s=retention_s,
-            lease_s=lease_s,
-        )
+        rest = observer, overrun_grace_s, retention_s, lease_s
+        self._dispatcher = Dispatcher(self._store, executor, reserve, *rest)
         self._database, self._attempts = database, self._dispatcher.attempts
         self._events, self._runs = self._dispatcher.events, self._dispatcher.runs
         # Where nobody else can change a job, nothing happens to it that its events do not tell.
@@ -182,7 +177,20 @@ class JobService:
         IdempotencyMismatch
             If the key was seen with another body.
         """
-        return await self._dispatcher.admit(kind, payload, time_limit_s, idempotency)
+        if kind not in self._store.kinds:
+            raise UnknownJobKind(kind)
+        known, ids = self._store.kinds[kind], labels()
+        insert = partial(
+            self._store.insert,
+            known,
+            payload,
+            places=self._places[known.lane],
+            time_limit_s=time_limit_s,
+            idempotency=idempotency,
+            request_id=ids.get("request_id"),
+            key_id=ids.get("key_id"),
+        )
+        return await self._dispatcher.admit(known.lane, insert)
 
     async def get(self, job_id: str) -> Job:
         """Return a job with its newest progress.

@@ -217,18 +217,18 @@ class JobStore(JobQueries):
         """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
         return self._end_attempt(job_id, attempt, JobStatus.FAILED, progress, error=error)
 
-    def requeue(self, job_id: str, attempt: int, progress: Progress | None) -> Job | None:
+    def requeue(self, job_id: str, attempt: int, progress: Progress) -> Job | None:
         """Put a job back into the queue that was stopped through no fault of its own.
 
-        Without a progress it keeps the one that is stored. A job that was to be cancelled is cancelled. None
-        if the job has gone on without this attempt.
+        A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
         """
         return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress)
 
-    def mark_crashed(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
+    def mark_crashed(self, job_id: str, attempt: int, reason: str, progress: Progress | None) -> Job | None:
         """Put a job back whose worker died: it waits again, or has failed if that was the last attempt.
 
-        A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
+        Without a progress it keeps the one that is stored. A job that was to be cancelled is cancelled. None
+        if the job has gone on without this attempt.
         """
         return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress, crash=reason)
 
@@ -296,12 +296,13 @@ class JobStore(JobQueries):
         list of Job
             Every job that was changed.
         """
-        with self.database.read() as connection:
-            owners = connection.scalars(sa.select(jobs.c.owner).where(_RUNNING).distinct()).all()
+        owners = [row["owner"] for row in self._rows(sa.select(jobs.c.owner).where(_RUNNING).distinct())]
         left = sa.and_(_RUNNING, jobs.c.owner.in_([owner for owner in owners if not alive(owner)]))
-        stranger = sa.and_(is_queued, jobs.c.kind.not_in(list(self.kinds)))
+        which = sa.or_(left, sa.and_(is_queued, jobs.c.kind.not_in(list(self.kinds))))
+        if not self._rows(sa.select(jobs.c.number).where(which).limit(1)):
+            return []
         with self.database.write() as connection:
-            rows = connection.execute(queries.select_to_change.where(sa.or_(left, stranger))).mappings().all()
+            rows = connection.execute(queries.select_to_change.where(which)).mappings().all()
             return [self._give_back(connection, row) for row in rows]
 
     def _give_back(self, connection: Connection, row: RowMapping) -> Job:
