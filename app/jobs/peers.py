@@ -22,9 +22,8 @@ import sqlalchemy as sa
 
 from app.jobs.attempts import Writer
 from app.jobs.model import JobStatus
-from app.jobs.queries import Announcements
 from app.jobs.store import JobStore
-from app.jobs.tables import DATABASE_NOW, jobs, owners
+from app.jobs.tables import DATABASE_NOW, Announcements, jobs, owners
 
 _CHANNEL = "allocator_jobs"
 _BEATS_A_LEASE = 5

@@ -5,11 +5,9 @@ Nothing here changes the table, or waits for one who does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
@@ -18,7 +16,7 @@ from app.jobs.clock import Clock
 from app.jobs.errors import InvalidCursor, JobNotFound
 from app.jobs.model import LANES, Job, JobPage, JobStatus, JobSummary, Lane, Progress
 from app.jobs.stored_json import read_later
-from app.jobs.tables import artifacts, jobs
+from app.jobs.tables import Database, artifacts, jobs
 
 _MOST_UNFINISHED = 1000
 """Results that wait to be completed, at most; one more stays as it is."""
@@ -42,44 +40,6 @@ select_small = sa.select(*(column for column in jobs.c if column.name not in _LA
 select_summaries = select_small.add_columns(jobs.c.assignment)
 # What is read in order to be changed is locked, where a database does not let writers take turns.
 select_to_change = select_jobs.with_for_update(of=jobs)
-
-
-class Announcements(Protocol):
-    """Short messages between the services that share a database; one may get lost."""
-
-    def tell(self, message: str) -> None:
-        """Send a message soon; never blocks."""
-
-    def close(self) -> None:
-        """End; what was told is sent if that is possible."""
-
-
-class Database(Protocol):
-    """What the jobs room needs of a database."""
-
-    shared: bool
-    """Whether several services may work on it; otherwise transactions that write take turns."""
-
-    def occupy(self) -> None:
-        """Keep other services off, where it is not shared."""
-
-    def vacate(self) -> None:
-        """Let another service have it."""
-
-    def write(self) -> AbstractContextManager[Connection]:
-        """Open a write transaction, committed at its end and rolled back by an exception."""
-
-    def read(self) -> AbstractContextManager[Connection]:
-        """Open a read transaction."""
-
-    def migrate(self, folder: Path, version_table: str) -> None:
-        """Bring tables to the newest version of a folder of Alembic migrations."""
-
-    def take_turn(self, connection: Connection, name: str) -> None:
-        """Let the transactions that call this with one name follow one another."""
-
-    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
-        """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
 
 
 class JobQueries:

@@ -30,8 +30,8 @@ from app.jobs.model import (
     Lane,
     Load,
 )
-from app.jobs.queries import Database
 from app.jobs.store import JobStore
+from app.jobs.tables import Database
 from app.logs import labels
 
 # A waiter may miss the news of a job that another process runs, and looks at the table.

@@ -23,11 +23,10 @@ from sqlalchemy import Connection, RowMapping
 from app.jobs import queries
 from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull, failure
-from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
-from app.jobs.queries import Database, JobQueries, is_queued
+from app.jobs.queries import JobQueries, is_queued
 from app.jobs.stored_json import read_later
-from app.jobs.tables import DATABASE_NOW, artifacts, idempotency_keys, jobs
+from app.jobs.tables import DATABASE_NOW, Database, artifacts, claim_key, idempotency_keys, jobs, keep
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
