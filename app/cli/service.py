@@ -25,7 +25,7 @@ from app.cli.common import DataDir, open_keys, open_library, read_settings, refu
 from app.cli.progress import bar
 from app.jobs import model
 from app.jobs.store import JobStore
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.library.seeding import seed_library
 from app.logs import configure_logs
 from app.memory import limit_arenas

@@ -32,7 +32,7 @@ from app.jobs import worker
 from app.jobs.errors import describe
 from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Work
 from app.jobs.model import Progress
-from app.jobs.work_context import CANCEL, DEADLINE, HELD, SHARE, new_control
+from app.jobs.worker import CANCEL, DEADLINE, HELD, SHARE, new_control
 
 _starting = threading.Lock()
 

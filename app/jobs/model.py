@@ -271,7 +271,7 @@ class JobKind:
         Its name in :meth:`app.jobs.service.JobService.submit`.
     work
         ``"module:function"``, resolved only in the worker; the function takes the payload and a
-        :class:`app.jobs.work_context.WorkContext` and returns a :class:`WorkResult`.
+        :class:`app.jobs.worker.WorkContext` and returns a :class:`WorkResult`.
     lane
         ``"interactive"`` for what somebody waits for, ``"batch"`` for what comes by the hundred,
         ``"training"`` for what takes long.

@@ -28,7 +28,7 @@ from app.jobs import worker
 from app.jobs.errors import describe
 from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Returned, Work
 from app.jobs.model import Progress
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.logs import configure_worker_logs
 
 REPORT_INTERVAL_S = 0.5
