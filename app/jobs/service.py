@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import platform
 import time
@@ -97,7 +98,7 @@ class JobService:
         self._database, self._attempts = database, self._dispatcher.attempts
         self._events, self._runs = self._dispatcher.events, self._dispatcher.runs
         # Where nobody else can change a job, nothing happens to it that its events do not tell.
-        self._look_again_s = _LOOK_AGAIN_S if database.shared else None
+        self._look_again_s = _LOOK_AGAIN_S if database.shared else math.inf
         self._stopping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -282,21 +283,18 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
-        end = None if timeout_s is None else time.monotonic() + timeout_s
+        end = math.inf if timeout_s is None else time.monotonic() + timeout_s
         events = self._events.open(job_id)
-        while True:
+        while not events.over.is_set():
             changed = events.changed
-            elsewhere = not events.over.is_set() and not self._runs(job_id)
-            if elsewhere and (await asyncio.to_thread(self._store.look, job_id)).status.finished:
-                return await self.get(job_id)
-            if events.over.is_set():
-                return events.ended or await self.get(job_id)
-            left = None if end is None else end - time.monotonic()
+            if not self._runs(job_id):
+                await self._events.catch_up(job_id, events)
+            pause_s = min(end - time.monotonic(), self._look_again_s)
             in_vain = self._stopping is not None and not self._runs(job_id)
-            if in_vain or (left is not None and left <= 0):
-                return await self.get(job_id)
-            pauses = [seconds for seconds in (left, self._look_again_s) if seconds is not None]
-            await wait_for(changed, min(pauses, default=None))
+            if events.over.is_set() or in_vain or pause_s <= 0:
+                break
+            await wait_for(changed, None if math.isinf(pause_s) else pause_s)
+        return events.ended or await self.get(job_id)
 
     async def wait_for_client(
         self, job_id: str, timeout_s: float | None, gone: Coroutine[Any, Any, object]
