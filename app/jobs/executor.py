@@ -240,14 +240,14 @@ class Executor(ABC):
         work: str,
         payload: Mapping[str, Any],
         *,
-        time_left_s: float | None,
-        on_progress: Callable[[Progress], None],
+        time_left_s: float | None = None,
+        on_progress: Callable[[Progress], None] = lambda _progress: None,
         labels: Mapping[str, str] = MappingProxyType({}),
     ) -> Execution:
         """Hand ``"module:function"`` and its payload to the next free worker; never blocks.
 
         The lines that the worker logs in its course have the ``labels``, ids by their names.
-        ``time_left_s`` may be negative: the work still runs, and sees that its time is up.
+        ``time_left_s`` may be negative: the work still runs, and sees that its time is up; None: no limit.
         """
         deadline = math.inf if time_left_s is None else time.monotonic() + time_left_s
         execution = Execution(self, Work(work, payload, dict(labels), deadline, on_progress))

@@ -239,10 +239,6 @@ class WorkResult:
     unfinished: bool = False
 
 
-def _the_least(_payload: Mapping[str, Any]) -> float:
-    return 1.0
-
-
 @dataclass(frozen=True, slots=True)
 class FollowUp:
     """What completes a result.
@@ -300,7 +296,7 @@ class JobKind:
     dropped_fields: frozenset[str] = frozenset()
     at_once: str | None = None
     max_run_s: float | None = None
-    effort: Callable[[Mapping[str, Any]], float] = _the_least
+    effort: Callable[[Mapping[str, Any]], float] = lambda _payload: 1.0
     follow_up: FollowUp | None = None
 
 

@@ -172,31 +172,24 @@ class Reserve:
         kind = self._store.kinds.get(job.kind)
         if kind is None or kind.follow_up is None:
             # A version that has no such work any more.
-            await self._complete(job, {})
-            return 0.0
+            return await self._complete(job, {})
         payload = {**job.payload, "result": job.result}
-        self._execution = self._executor.submit(
-            kind.follow_up.work, payload, time_left_s=None, on_progress=_ignore, labels=job.labels
-        )
+        self._execution = self._executor.submit(kind.follow_up.work, payload, labels=job.labels)
         try:
             outcome = await self._execution.outcome()
         finally:
             self._execution = None
         if isinstance(outcome, Returned):
-            if not outcome.work.unfinished:
-                await self._complete(job, outcome.work.result)
-        elif not (self.completing.ended or (isinstance(outcome, Lost) and not outcome.begun)):
-            reason = outcome.error["detail"] if isinstance(outcome, Raised) else outcome.reason
-            _log.warning("a result is not completed: %s", reason, extra={"job_id": job.id})
-            await self._complete(job, kind.follow_up.given_up, failed=True)
-        return 0.0
+            return 0.0 if outcome.work.unfinished else await self._complete(job, outcome.work.result)
+        if self.completing.ended or (isinstance(outcome, Lost) and not outcome.begun):
+            return 0.0
+        reason = outcome.error["detail"] if isinstance(outcome, Raised) else outcome.reason
+        _log.warning("a result is not completed: %s", reason, extra={"job_id": job.id})
+        return await self._complete(job, kind.follow_up.given_up, failed=True)
 
-    async def _complete(self, job: Job, fields: Mapping[str, Any], *, failed: bool = False) -> None:
+    async def _complete(self, job: Job, fields: Mapping[str, Any], *, failed: bool = False) -> float:
         await self._writer.write(self._store.complete_result, job.id, job.attempt, fields, failed=failed)
-
-
-def _ignore(_progress: object) -> None:
-    """Nobody waits for it."""
+        return 0.0
 
 
 def latest_start(waits: Iterable[Wait], pace: Pace) -> float:
