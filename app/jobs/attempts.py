@@ -173,6 +173,10 @@ class Attempts:
         held = Counter(attempt.job.lane for attempt in self if not attempt.at_once)
         return {lane: held[lane] + self.reserved[lane] for lane in LANES}
 
+    def leave_spare(self) -> bool:
+        """Say whether not all workers are held."""
+        return sum(self.by_lane().values()) < self._all
+
     def may_start(self, ready: int) -> tuple[Lane, ...]:
         """Return the lanes of which a job may start, in their order, when ``ready`` workers are warm."""
         held = self.by_lane()

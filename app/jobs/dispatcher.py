@@ -73,7 +73,7 @@ class Dispatcher:
         self._grace_s, self._retention_s = grace_s, retention_s
         self.attempts, self.events = Attempts(executor.capacity), EventStreams(store, self.runs)
         self._writer, self._peers = Writer(), Peers(store, lease_s)
-        self._reserve = Reserve(store, self._writer, reserve, self._answer_at_once, self._has_spare)
+        self._reserve = Reserve(store, self._writer, reserve, self._answer_at_once, self.attempts.leave_spare)
         # Who gets a free worker is decided for one job after the other.
         self._choosing = asyncio.Lock()
         # How often it was told that a job may wait, and for how many of these none was left. Only hints: the
@@ -179,12 +179,8 @@ class Dispatcher:
 
     def load(self) -> Load:
         """Return how busy the workers are."""
-        return Load(
-            capacity=self._executor.capacity,
-            ready=self._executor.ready,
-            running=self.attempts.by_lane(),
-            restarts=sum(executor.restarts for executor in self._executors),
-        )
+        restarts = sum(executor.restarts for executor in self._executors)
+        return Load(self._executor.capacity, self._executor.ready, self.attempts.by_lane(), restarts)
 
     def _moved(self, job: Job, ran_s: float | None = None) -> None:
         """Take note of a job that waits or has ended, and did not before; tell everybody who is interested.
@@ -295,9 +291,6 @@ class Dispatcher:
         if job is None or not job.status.finished:
             # It goes on later, or elsewhere: who listens has to look there.
             attempt.events.notify()
-
-    def _has_spare(self) -> bool:
-        return sum(self.attempts.by_lane().values()) < self._executor.capacity
 
     async def _save_progress(self) -> float:
         unsaved = [attempt for attempt in self.attempts if attempt.unsaved]

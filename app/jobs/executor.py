@@ -270,12 +270,6 @@ class Executor(ABC):
             keeper.cancel()
         await asyncio.gather(*self._keepers, return_exceptions=True)
 
-    def _give_back_what_waits(self) -> None:
-        """End executions that no worker has begun with, as none is left: until one is warm takes a while."""
-        for execution in tuple(self._executions):
-            if execution.worker is None:
-                execution.kill()
-
     @abstractmethod
     def _new_worker(self) -> Worker:
         """Make a worker, which begins to start."""
@@ -312,5 +306,7 @@ class Executor(ABC):
         finally:
             self.ready -= warm
             if warm and not self.ready:
-                self._give_back_what_waits()
+                # Until one is warm takes a while: what none has begun with is given back.
+                for waiting in [each for each in self._executions if each.worker is None]:
+                    waiting.kill()
             await worker.discard()

@@ -73,10 +73,7 @@ class _Worker:
     """
 
     def __init__(
-        self,
-        context: SpawnContext | ForkServerContext,
-        log_level: str | None,
-        environment: Mapping[str, str],
+        self, context: SpawnContext | ForkServerContext, log_level: str | None, environment: Mapping[str, str]
     ) -> None:
         self._pipe, theirs = context.Pipe()
         self._control = cast("MutableSequence[float]", context.RawArray(ctypes.c_double, new_control()))

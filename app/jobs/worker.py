@@ -163,10 +163,7 @@ def _clean(progress: Progress) -> Progress:
 
 
 def main(
-    pipe: Connection,
-    control: MutableSequence[float],
-    log_level: str | None,
-    environment: Mapping[str, str],
+    pipe: Connection, control: MutableSequence[float], log_level: str | None, environment: Mapping[str, str]
 ) -> None:
     """Be a worker of this machine: it dies with its parent, and leaves Ctrl-C to it.
 
