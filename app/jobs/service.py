@@ -180,7 +180,7 @@ class JobService:
         """
         if kind not in self._store.kinds:
             raise UnknownJobKind(kind)
-        known, ids = self._store.kinds[kind], labels()
+        known = self._store.kinds[kind]
         insert = partial(
             self._store.insert,
             known,
@@ -188,8 +188,7 @@ class JobService:
             places=self._places[known.lane],
             time_limit_s=time_limit_s,
             idempotency=idempotency,
-            request_id=ids.get("request_id"),
-            key_id=ids.get("key_id"),
+            asked_by=labels(),
         )
         return await self._dispatcher.admit(known.lane, insert)
 

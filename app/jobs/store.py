@@ -15,6 +15,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
@@ -101,8 +102,7 @@ class JobStore(JobQueries):
         retry_after_s: float = 1.0,
         time_limit_s: float | None = None,
         idempotency: Idempotency | None = None,
-        request_id: str | None = None,
-        key_id: str | None = None,
+        asked_by: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Job, bool]:
         """Add a job, or find the one that was added with the same idempotency key.
 
@@ -113,8 +113,8 @@ class JobStore(JobQueries):
             another waits that comes before it.
         places, retry_after_s
             How many may wait in its lane, where it has to, and when one more is expected to have a place.
-        request_id, key_id
-            The request that asks for it, and its API key.
+        asked_by
+            The ids of the request and of its API key, by the names of their columns, where there are any.
 
         Returns
         -------
@@ -157,8 +157,8 @@ class JobStore(JobQueries):
                 "deadline": None if time_limit_s is None else now + time_limit_s,
                 "created_at": now,
                 "started_at": now if run_now else None,
-                "request_id": request_id,
-                "key_id": key_id,
+                "request_id": asked_by.get("request_id"),
+                "key_id": asked_by.get("key_id"),
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
