@@ -26,7 +26,7 @@ from typing import Any
 
 from app.jobs import worker
 from app.jobs.errors import describe
-from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Returned, Work
+from app.jobs.executor import Executor, Lost, Outcome, Raised, Returned, Work
 from app.jobs.model import Progress
 from app.jobs.worker import WorkContext
 from app.logs import configure_worker_logs
@@ -218,12 +218,10 @@ class RayWorker:
     def __init__(self, log_level: str | None) -> None:
         if log_level is not None:
             configure_worker_logs(log_level)
-        self._reporter = worker.Reporter(self._take, worker.REPORT_INTERVAL_S)
         self._lock, self._news = threading.Lock(), threading.Event()
-        self._context = WorkContext(self._reporter.report)
+        self._context = WorkContext(self._report)
         self._serial = self._cancelled = 0
         self._progress: Progress | None = None
-        self._outcome: Returned | Raised | None = None
 
     def progress(self) -> Iterator[tuple[int, Progress]]:
         """Yield the newest progress with the serial of its work, again and again while the process lives."""
@@ -233,7 +231,7 @@ class RayWorker:
             self._news.clear()
             serial, progress = self._serial, self._progress
             if progress is not None:
-                yield serial, progress
+                yield serial, worker.clean(progress)
                 time.sleep(REPORT_INTERVAL_S)
 
     def run(
@@ -244,7 +242,7 @@ class RayWorker:
         payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
-    ) -> tuple[Progress | None, Returned | Raised | None]:
+    ) -> tuple[Progress | None, Returned | Raised]:
         """Do one piece of work, and return its last progress and its outcome.
 
         Parameters
@@ -260,22 +258,19 @@ class RayWorker:
         cancelled
             Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
-        context = WorkContext.in_process(self._reporter.report, time_left_s)
+        context = WorkContext.in_process(self._report, time_left_s)
         with self._lock:
             self._serial, self._context = serial, context
             if cancelled or self._cancelled == serial:
                 context.cancel()
-        worker.perform(labels, work, payload, context, self._reporter)
+        ended: list[Returned | Raised] = []
+        worker.perform(labels, work, payload, context, ended.append)
         progress, self._progress = self._progress, None
-        return progress, self._outcome
+        return None if progress is None else worker.clean(progress), ended[0]
 
-    def _take(self, message: Message) -> None:
-        """Take note of what the work sends."""
-        if isinstance(message, Progress):
-            self._progress = message
-            self._news.set()
-        else:
-            self._outcome = message
+    def _report(self, progress: Progress) -> None:
+        self._progress = progress
+        self._news.set()
 
     def cancel(self, serial: int) -> None:
         """Ask the work to stop; also if it has been sent and not begun."""

@@ -33,6 +33,8 @@ from app.memory import give_back
 
 REPORT_INTERVAL_S = 0.05
 
+Finish = Callable[[Returned | Raised], None]
+
 CANCEL, DEADLINE, SHARE, HELD = 0, 1, 2, 3
 
 
@@ -146,10 +148,10 @@ class Reporter:
 
     def _send_newest(self) -> None:
         if self._unsent:
-            self._send(_clean(self._unsent.pop()))
+            self._send(clean(self._unsent.pop()))
 
 
-def _clean(progress: Progress) -> Progress:
+def clean(progress: Progress) -> Progress:
     """Return a progress of plain JSON numbers: a reward may be minus infinity until a plan is found."""
     reward = progress.best_reward
     plan = progress.assignment
@@ -188,7 +190,7 @@ def main(
     with contextlib.suppress(EOFError, OSError):  # the parent has gone
         while True:
             labels, work, payload = pipe.recv()
-            perform(labels, work, payload, context, reporter)
+            perform(labels, work, payload, context, reporter.finish)
 
 
 def _die_with_parent() -> None:
@@ -200,7 +202,7 @@ def _die_with_parent() -> None:
 
 
 def perform(
-    labels: dict[str, str], work: str, payload: Mapping[str, Any], context: WorkContext, reporter: Reporter
+    labels: dict[str, str], work: str, payload: Mapping[str, Any], context: WorkContext, finish: Finish
 ) -> None:
     """Do one piece of work. Whatever it raises is sent as a value, so nothing depends on pickling it.
 
@@ -212,16 +214,16 @@ def perform(
         ``"module:function"`` and what it gets.
     context
         What it gets besides.
-    reporter
-        Sends what comes of it.
+    finish
+        Gets what comes of it, and why where that cannot be sent.
     """
     try:
         with labelled(labels):
             result = resolve(work)(payload, context)
         # A result that is no JSON must fail here, with a traceback, and not when it is stored.
-        reporter.finish(Returned(replace(result, result=written(result.result))))
+        finish(Returned(replace(result, result=written(result.result))))
     except BaseException as error:
-        reporter.finish(Raised(describe(error), traceback.format_exc()))
+        finish(Raised(describe(error), traceback.format_exc()))
 
 
 def warm_up(payload: Mapping[str, Any], context: WorkContext) -> WorkResult:  # noqa: ARG001 - nothing to report
