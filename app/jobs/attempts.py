@@ -165,9 +165,6 @@ class Attempts:
     def __iter__(self) -> Iterator[Attempt]:
         return iter(list(self._running.values()))
 
-    def __len__(self) -> int:
-        return len(self._running)
-
     def by_lane(self) -> dict[Lane, int]:
         """Return how many workers each lane holds."""
         held = Counter(attempt.job.lane for attempt in self if not attempt.at_once)

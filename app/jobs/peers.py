@@ -2,7 +2,8 @@
 
 On SQLite there are none. On PostgreSQL what is told is only a hint to look, and may get lost: waiting jobs
 and dead owners are looked for once a lease, cancellations with every heartbeat, and those who wait for a job
-look at the table now and then.
+look at the table now and then. With every heartbeat, on SQLite too, a service compares what runs in it with
+what the table says of that.
 
 An owner that was not seen for a lease, by the database's clock, is dead, and its jobs are given back. If it
 lives on after all (it was suspended, or cut off), nothing is finished twice: its attempts are outdated from
@@ -93,10 +94,13 @@ class Peers:
     def beat(self) -> dict[str, tuple[int, bool]]:
         """Show that this service lives, and return which jobs the table says it runs. Blocks.
 
-        By their id the attempt, and whether it is to be cancelled.
-
-        After a time in which it could not, the others could not either: no service counts as dead until all
+        Where there can be no others, nothing is written. After a time in which it could not, the others could not either: no service counts as dead until all
         that live have had the time of a lease to show themselves.
+
+        Returns
+        -------
+        dict
+            Of each job by its id the attempt, and whether it is to be cancelled.
         """
         begun = self._clock()
         me, mine = owners.c.owner == self._owner, jobs.c.owner == self._owner

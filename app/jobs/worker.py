@@ -105,7 +105,7 @@ class WorkContext:
 
 
 class Reporter:
-    """Sends the newest progress of work, at most one every interval, and after the last one its outcome.
+    """Sends the newest progress of work, at most one every ``REPORT_INTERVAL_S``, and then its outcome.
 
     The sending is a thread's, so that the work never waits for the reader, and so that the newest progress
     goes out in time even if the work reports nothing after it for long.
@@ -114,12 +114,10 @@ class Reporter:
     ----------
     send
         Brings a message to the executor; one thread at a time calls it.
-    interval_s
-        Between two progresses.
     """
 
-    def __init__(self, send: Callable[[Message], None], interval_s: float) -> None:
-        self._send, self._interval_s = send, interval_s
+    def __init__(self, send: Callable[[Message], None]) -> None:
+        self._send = send
         self._unsent: deque[Progress] = deque(maxlen=1)
         self._news, self._sending = threading.Event(), threading.Lock()
         threading.Thread(target=self._send_progress, name="progress", daemon=True).start()
@@ -144,7 +142,7 @@ class Reporter:
                     self._send_newest()
             except OSError:
                 return
-            time.sleep(self._interval_s)
+            time.sleep(REPORT_INTERVAL_S)
 
     def _send_newest(self) -> None:
         if self._unsent:
@@ -185,7 +183,7 @@ def main(
         configure_worker_logs(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, name="parent-watch", daemon=True).start()
-    reporter = Reporter(pipe.send, REPORT_INTERVAL_S)
+    reporter = Reporter(pipe.send)
     context = WorkContext(reporter.report, control)
     with contextlib.suppress(EOFError, OSError):  # the parent has gone
         while True:

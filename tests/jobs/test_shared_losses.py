@@ -179,7 +179,7 @@ def test_a_service_that_takes_its_own_job_again_loses_no_worker(shared_url, tmp_
             (tmp_path / "gate").touch()
             ended = await finished(one, job)
             assert (ended.status, ended.attempt) == (JobStatus.CANCELLED, 2)
-            await eventually(lambda: not one._attempts)
+            await eventually(lambda: not list(one._attempts))
             assert sum(one.load().running.values()) == 0
             await eventually(lambda: one.load().ready == 2)
             both = [(await one.submit("echo", {}))[0] for _ in range(2)]
