@@ -139,10 +139,7 @@ class EventStreams:
 
     def open(self, job_id: str) -> JobEvents:
         """Return a job's events, new ones if nobody has them."""
-        events = self._known.get(job_id)
-        if events is None:
-            events = self._known[job_id] = JobEvents()
-        return events
+        return self._known.setdefault(job_id, JobEvents())
 
     def known(self, job_id: str) -> JobEvents | None:
         """Return a job's events if somebody has them."""

@@ -94,7 +94,9 @@ class Peers:
     def beat(self) -> dict[str, tuple[int, bool]]:
         """Show that this service lives, and return which jobs the table says it runs. Blocks.
 
-        Where there can be no others, nothing is written. After a time in which it could not, the others could not either: no service counts as dead until all
+        Where there can be no others, nothing is written.
+
+        After a time in which it could not, the others could not either: no service counts as dead until all
         that live have had the time of a lease to show themselves.
 
         Returns
