@@ -231,13 +231,9 @@ class Attempts:
         """
         busy = tuple(running)
         own = [each for each in busy if each[0] == lane]
-        if len(own) >= self._most[lane]:
-            seconds = min(self._rest(*each) for each in own)
-        elif len(busy) >= self._all:
-            seconds = min(self._rest(*each) for each in busy)
-        else:
-            seconds = self._mean(lane) / self._most[lane]
-        return max(1.0, seconds)
+        rests = [self._rest(*each) for each in (own if len(own) >= self._most[lane] else busy)]
+        is_free = len(own) < self._most[lane] and len(busy) < self._all
+        return max(1.0, self._mean(lane) / self._most[lane] if is_free else min(rests))
 
     def _rest(self, lane: Lane, ran_s: float, left_s: float | None) -> float:
         """Return how long a job that runs is expected to go on."""

@@ -58,7 +58,9 @@ class LocalExecutor(Executor):
             return _Worker(multiprocessing.get_context("spawn"), self._log_level, self._environment)
         forkserver.set_forkserver_preload([self._preload])
         context = multiprocessing.get_context("forkserver")
-        return _Worker(context, self._log_level, self._environment | _same_modules())
+        # It finds modules where this process does, and nowhere else.
+        modules = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+        return _Worker(context, self._log_level, self._environment | modules)
 
 
 class _Worker:
@@ -184,11 +186,6 @@ class _Worker:
         self._sender.shutdown(wait=False)
         if not self._outcome.done():
             self._outcome.set_result(Lost(f"worker process {self.name} died"))
-
-
-def _same_modules() -> dict[str, str]:
-    """Return the variables by which a fork server finds modules where this process does, and nowhere else."""
-    return {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 @contextlib.contextmanager

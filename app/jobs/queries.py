@@ -183,15 +183,14 @@ def find(connection: Connection, job_id: str, select: sa.Select[Any]) -> RowMapp
     return row
 
 
-def waiting_in(connection: Connection, lane: Lane) -> int:
-    """Return how many jobs wait in a lane."""
-    return connection.execute(sa.select(sa.func.count()).where(is_queued, jobs.c.lane == lane)).scalar_one()
+def count(connection: Connection, *which: sa.ColumnElement[bool]) -> int:
+    """Return how many jobs there are of which all that is true."""
+    return connection.execute(sa.select(sa.func.count()).where(*which)).scalar_one()
 
 
 def has_place(connection: Connection) -> bool:
     """Say whether one more result can wait to be completed."""
-    others = sa.select(sa.func.count()).where(jobs.c.unfinished.is_not(None))
-    return connection.execute(others).scalar_one() < _MOST_UNFINISHED
+    return count(connection, jobs.c.unfinished.is_not(None)) < _MOST_UNFINISHED
 
 
 def progress_columns(progress: Progress) -> dict[str, Any]:

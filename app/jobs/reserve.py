@@ -110,7 +110,8 @@ class Reserve:
         self._kinds = [kind.name for kind in store.kinds.values() if kind.at_once is not None]
         self._efforts: dict[str, float] = {}
         self._pace = Pace()
-        self._busy = False
+        # Held while jobs are being answered.
+        self._answers = asyncio.Lock()
         self._execution: Execution | None = None
         self.answering = Loop(self._answer_due, "jobs whose time is up could not be answered")
         self.completing = Loop(self._complete_next, "a result could not be completed")
@@ -147,12 +148,9 @@ class Reserve:
             if in_s > 0:
                 return min(in_s, _LONGEST_LOOK_S)
             self._make_way()
-            self._busy = True
-            try:
+            async with self._answers:
                 for job_id, seconds in (await self._answer(due(waits, self._pace, now))).items():
                     self._pace.took(waits[job_id].effort, seconds)
-            finally:
-                self._busy = False
         return None
 
     def _make_way(self) -> None:
@@ -164,7 +162,7 @@ class Reserve:
         """Complete a result, unless that holds up somebody; return how long there is nothing to do."""
         if self._executor is None:
             return None
-        if self._busy or not (self._executor.ready and self._has_spare()):
+        if self._answers.locked() or not (self._executor.ready and self._has_spare()):
             return _PAUSE_S
         job = await asyncio.to_thread(self._store.next_unfinished, self._store.owner)
         if job is None:

@@ -139,7 +139,7 @@ class JobStore(JobQueries):
             if not run_now or _is_there(connection, is_queued, before):
                 run_now = False
                 self.database.take_turn(connection, f"queue {kind.lane}")
-                if queries.waiting_in(connection, kind.lane) >= places:
+                if queries.count(connection, is_queued, jobs.c.lane == kind.lane) >= places:
                     raise QueueFull(kind.lane, places, retry_after_s)
             now = self.clock.now()
             row: dict[str, Any] = {
