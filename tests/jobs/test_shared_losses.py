@@ -150,9 +150,9 @@ def test_nobody_is_judged_before_all_had_the_time_to_show_themselves(shared_url)
     database.dispose()
 
 
-def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(shared_url):
+def test_a_job_of_which_a_cut_connection_left_no_word_is_not_forgotten(any_database_url):
     async def scenario():
-        async with running(shared_url, lease_s=LEASE_S) as service:
+        async with running(any_database_url, lease_s=LEASE_S) as service:
             # As if the commit of a job that begins as running had been made and its confirmation lost.
             store = service._store
             kind = next(kind for kind in KINDS if kind.name == "echo")
