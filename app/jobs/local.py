@@ -85,7 +85,6 @@ class _Worker:
         # Not one of those that requests need: a large payload takes a while.
         self._sender = ThreadPoolExecutor(1, "worker-send")
         self._loop = asyncio.get_running_loop()
-        self._started: asyncio.Future[None] = self._loop.create_future()
         self._gone = asyncio.Event()
         self._doomed = False
         self._on_progress: Callable[[Progress], None] | None = None
@@ -93,9 +92,7 @@ class _Worker:
         # Multiprocessing waits at the end of this process for those that it has made.
         atexit.register(self.kill)
         # A thread of its own: a fork server answers only when it has loaded, and requests need the others.
-        thread = threading.Thread(target=self._live, args=(theirs, environment), daemon=True)
-        thread.name = "worker-start"
-        thread.start()
+        threading.Thread(None, self._live, "worker-start", (theirs, environment), daemon=True).start()
 
     @property
     def name(self) -> str:
@@ -108,7 +105,6 @@ class _Worker:
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the process died idle: its slot brings another."""
-        await asyncio.shield(self._started)  # who gives up does not take it from the thread that sets it
         if self._gone.is_set():
             return None
         self._on_progress, self._outcome = work.on_progress, self._loop.create_future()
@@ -152,14 +148,13 @@ class _Worker:
         try:
             with _environment(environment):
                 self._process.start()
-        except Exception as error:  # whatever it is, it is raised where the start is waited for
-            self._call(self._started.set_exception, error)
+        except Exception as error:  # whatever it is, the slot has sent its first work, and learns of it
+            self._call(self._hear, Raised(describe(error), traceback.format_exc()))
         else:
             # Once only the worker has the other end, the pipe closes when the worker dies.
             theirs.close()
             if self._doomed:
                 self.kill()
-            self._call(self._started.set_result, None)
             # One that sends what cannot be read is no better than a dead one.
             with contextlib.suppress(Exception):
                 while True:
