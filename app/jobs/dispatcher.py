@@ -1,4 +1,4 @@
-"""Takes jobs in, gives them to workers, and brings what becomes of them into the table.
+"""Takes jobs in, gives them to workers, brings what becomes of them into the table, and keeps that in order.
 
 Everything here runs on one event loop; what touches the disk runs in threads. All writing to the job table
 goes through one thread, so what is known here about the table changes in the order of its commits. What is
@@ -293,6 +293,7 @@ class Dispatcher:
             attempt.events.notify()
 
     async def _save_progress(self) -> float:
+        """Store the progress that is new; this and what follows is done now and then."""
         unsaved = [attempt for attempt in self.attempts if attempt.unsaved]
         for attempt in unsaved:
             attempt.unsaved = False
