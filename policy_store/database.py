@@ -23,6 +23,9 @@ from policy_store.announcements import Announcements
 from policy_store.engines import Engines
 from policy_store.errors import MigrationFailed, NestedWrite, UnsupportedDatabase
 
+_ENVIRONMENT = Path(__file__).parent / "migrations"
+"""Where Alembic finds ``env.py``, whichever room's tables are migrated."""
+
 _NEWER = (
     "{}: the database was made by a newer version of this program; start that version, or go back to an "
     "earlier backup"
@@ -195,17 +198,18 @@ class Database:
         """Open a channel of short messages between the processes that share the database."""
         return Announcements(self.write_engine.url, channel, heard)
 
-    def migrate(self, script_location: Path, version_table: str) -> None:
-        """Bring tables to the newest version of an Alembic folder, all of it or nothing.
+    def migrate(self, folder: Path, version_table: str) -> None:
+        """Bring tables to the newest version of a folder of Alembic migrations, all of it or nothing.
 
         Safe when several processes start at once: one migrates, the others wait (with SQLite up to
         60 seconds) and find nothing left to do.
 
         Parameters
         ----------
-        script_location
-            Folder with ``env.py`` and ``versions/``. ``env.py`` finds ``connection`` and ``version_table``
-            in ``context.config.attributes``; the transaction is begun before and committed after it.
+        folder
+            Its ``versions/`` has the migrations. They are run by ``policy_store/migrations/env.py``, which
+            finds ``connection`` and ``version_table`` in ``context.config.attributes``; the transaction is
+            begun before and committed after it.
         version_table
             Table that records the version; each folder has its own.
 
@@ -222,7 +226,10 @@ class Database:
         from alembic.util import CommandError  # noqa: PLC0415 - as above
 
         config = Config()
-        config.set_main_option("script_location", str(script_location).replace("%", "%%"))
+        config.set_main_option("script_location", str(_ENVIRONMENT).replace("%", "%%"))
+        config.set_main_option("version_locations", str(folder / "versions").replace("%", "%%"))
+        # One folder, whatever characters its name has.
+        config.set_main_option("path_separator", "newline")
         with _migration_lock, self._writers.hold(), self._migration_engine.begin() as connection:
             self.take_turn(connection, version_table)
             config.attributes["connection"] = connection
@@ -231,11 +238,9 @@ class Database:
                 command.upgrade(config, "head")
             except CommandError as error:
                 newer = isinstance(error.__cause__, ResolutionError)
-                raise MigrationFailed(
-                    str(script_location), _NEWER.format(error) if newer else str(error)
-                ) from error
+                raise MigrationFailed(str(folder), _NEWER.format(error) if newer else str(error)) from error
             if not self.shared and (broken := sqlite.broken_references(connection)):
-                raise MigrationFailed(str(script_location), "; ".join(broken[:5]))
+                raise MigrationFailed(str(folder), "; ".join(broken[:5]))
 
     def dispose(self) -> None:
         """Close every connection that is not in use; the object can still be used afterwards."""

@@ -61,9 +61,9 @@ class DatabaseOccupied(PolicyStoreError):
 class MigrationFailed(PolicyStoreError):
     """The tables cannot be brought to this version; they are as they were before."""
 
-    def __init__(self, script_location: str, reason: str) -> None:
-        super().__init__(f"migrations of {script_location} failed: {reason}")
-        self.script_location = script_location
+    def __init__(self, folder: str, reason: str) -> None:
+        super().__init__(f"migrations of {folder} failed: {reason}")
+        self.folder = folder
         self.reason = reason
 
 

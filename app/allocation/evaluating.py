@@ -14,7 +14,7 @@ from app.domain.plan import Plan
 from app.domain.records import problem_from_record, problem_to_record, to_record
 from app.domain.warnings import problem_warnings
 from app.jobs.model import WorkResult
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.simulation.amounts import Amounts
 from app.simulation.mid_mission import remaining_at
 from app.solvers.stop import Deadline

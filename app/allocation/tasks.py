@@ -22,8 +22,7 @@ from app.domain.records import problem_from_record, to_record
 from app.domain.said import said
 from app.domain.warnings import problem_warnings
 from app.jobs.model import Progress, WorkResult
-from app.jobs.work_context import WorkContext
-from app.jobs.worker import resolve
+from app.jobs.worker import WorkContext, resolve
 from app.simulation.compilation import told_of_compiling
 from app.solvers import protocol
 from app.solvers.registry import create_solver, parse_parameters

@@ -7,7 +7,7 @@ import math
 from app.allocation import bounding
 from app.allocation.answer_time import BOUND, AnswerSize, AnswerTime, expected_size
 from app.domain.problem import Problem
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 
 _PREPARING_SHARE = 0.25
 """A search that is late by more than this share of the time it had has only prepared."""

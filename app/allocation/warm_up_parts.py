@@ -16,8 +16,7 @@ from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_to_record
 from app.domain.surroundings import Base
 from app.jobs.model import Progress
-from app.jobs.work_context import WorkContext
-from app.jobs.worker import resolve
+from app.jobs.worker import WorkContext, resolve
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers import protocol

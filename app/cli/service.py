@@ -33,7 +33,7 @@ from app.cli.common import (
 from app.cli.progress import bar
 from app.jobs import model
 from app.jobs.store import JobStore
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.library.seeding import seed_library
 from app.logs import configure_logs
 from app.memory import limit_arenas

@@ -5,17 +5,17 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from statistics import fmean
 from typing import Any, Literal, ParamSpec, TypeVar
 
 from app.domain.said import said
 from app.jobs.errors import INTERNAL_ERROR, describe, failure
 from app.jobs.events import JobEvents
-from app.jobs.executor import Execution, Outcome, Raised, Returned
-from app.jobs.model import BEST_KNOWN, LANES, Job, JobStatus, JobSummary, Lane, Progress
+from app.jobs.executor import Executor, Outcome, Raised, Returned
+from app.jobs.model import BEST_KNOWN, LANES, Job, JobKind, JobStatus, JobSummary, Lane, Progress
 from app.jobs.store import JobStore
 from app.store_faults import STORE_IS_AWAY, first_line
 
@@ -34,77 +34,105 @@ Reason = Literal["time", "cancel", "stop", "gone"]
 job is no longer this service's."""
 
 
-@dataclass(slots=True, eq=False)
 class Attempt:
-    """One attempt at a job.
+    """One attempt at a job, handed to an executor as it is made.
 
-    Attributes
+    Parameters
     ----------
     job
         As it was taken from the queue.
-    events
+    kind, events
         Of the job.
-    begun_at
-        When it was handed to a worker, by the service's clock.
-    progress
-        The newest; ``unsaved`` if it is not in the table yet.
-    execution
-        The work; None until it is handed over.
+    executor
+        What runs it.
+    now
+        The time by the service's clock.
+    grace_s
+        How long the work may go on after it was asked to stop, or its time is up.
     at_once
         Whether it holds no worker, because its time is up and it is answered beside them.
+
+    Attributes
+    ----------
+    job, kind, events, grace_s, at_once
+        The same.
+    progress
+        The newest; ``unsaved`` if it is not in the table yet.
+    begun_at
+        When it was handed over, by the service's clock.
     killed_for
         Why its worker was killed, if it was.
-    timers
-        What would kill it later.
     asked_to_stop
         Whether somebody cancelled it, or it took longer than its kind may.
     """
 
-    job: Job
-    events: JobEvents
-    progress: Progress
-    begun_at: float
-    at_once: bool = False
-    unsaved: bool = False
-    execution: Execution | None = None
-    killed_for: Reason | None = None
-    timers: list[asyncio.TimerHandle] = field(default_factory=list)
-    asked_to_stop: bool = False
+    def __init__(
+        self,
+        job: Job,
+        kind: JobKind,
+        events: JobEvents,
+        executor: Executor,
+        now: float,
+        grace_s: float,
+        at_once: bool,
+    ) -> None:
+        self.job, self.kind, self.events, self.progress = job, kind, events, job.progress
+        self.begun_at, self.grace_s, self.at_once = now, grace_s, at_once
+        self.unsaved = self.asked_to_stop = False
+        self.killed_for: Reason | None = None
+        self._timers: list[asyncio.TimerHandle] = []
+        work = (at_once and kind.at_once) or kind.work
+        payload, left_s = job.payload, self.left_s(now)
+        if job.attempt > 1 and job.progress.assignment is not None:
+            payload = {**payload, BEST_KNOWN: job.progress.as_json()}
+        self._execution = executor.submit(
+            work, payload, time_left_s=left_s, on_progress=self._report, labels=job.labels
+        )
+        if left_s is not None:
+            self._later(max(0.0, left_s) + grace_s, self._end_overdue)
+        if kind.max_run_s is not None:
+            self._later(kind.max_run_s, self.stop, "time")
 
-    @property
-    def payload(self) -> Mapping[str, Any]:
-        """What the work gets: the job's, and the progress of an earlier attempt if it has a plan."""
-        if self.job.attempt == 1 or self.job.progress.assignment is None:
-            return self.job.payload
-        return {**self.job.payload, BEST_KNOWN: self.job.progress.as_json()}
+    async def outcome(self) -> Outcome:
+        """Wait until the work has ended."""
+        outcome = await self._execution.outcome()
+        for timer in self._timers:
+            timer.cancel()
+        return outcome
 
-    def report(self, progress: Progress) -> None:
+    def left_s(self, now: float) -> float | None:
+        """Return how much time its limit leaves it; None for no limit."""
+        return None if self.job.deadline is None else self.job.deadline - now
+
+    def stop(self, reason: Reason = "cancel") -> None:
+        """Ask the work to stop by itself, and end its worker if it has not after the grace."""
+        if not self.asked_to_stop:
+            self.asked_to_stop = True
+            self._execution.cancel()
+            self._later(self.grace_s, self.kill, reason)
+
+    def kill(self, reason: Reason) -> None:
+        """End the worker, for the first reason that is given."""
+        if self.killed_for is None:
+            self.killed_for = reason
+            self._execution.kill()
+
+    def _report(self, progress: Progress) -> None:
         """Take note of progress, and tell it unless the job is no longer this service's."""
         self.progress, self.unsaved = progress, True
         if self.killed_for != "gone":
             self.events.report(progress)
 
-    def stop(self, grace_s: float, reason: Reason = "cancel") -> None:
-        """Ask the work to stop by itself, and end its worker if it has not after so many seconds."""
-        if self.execution is not None and not self.asked_to_stop:
-            self.asked_to_stop = True
-            self.execution.cancel()
-            self.timers.append(asyncio.get_running_loop().call_later(grace_s, self.kill, reason))
-
-    def end_overdue(self, grace_s: float, held_s: float = 0.0, was_held: bool = False) -> None:
+    def _end_overdue(self, held_s: float = 0.0, was_held: bool = False) -> None:
         """End the worker, whose work did not end with its time; not while it is held, nor right after."""
-        held = self.execution is not None and self.execution.is_held()
+        held = self._execution.is_held()
         if (held or was_held) and held_s < _LONGEST_HELD_S:
-            later = asyncio.get_running_loop().call_later
-            self.timers.append(later(grace_s, self.end_overdue, grace_s, held_s + grace_s, held))
+            self._later(self.grace_s, self._end_overdue, held_s + self.grace_s, held)
         else:
             self.kill("time")
 
-    def kill(self, reason: Reason) -> None:
-        """End the worker, for the first reason that is given."""
-        if self.killed_for is None and self.execution is not None:
-            self.killed_for = reason
-            self.execution.kill()
+    def _later(self, seconds: float, do: Callable[..., None], *arguments: Any) -> None:
+        self._timers.append(asyncio.get_running_loop().call_later(seconds, do, *arguments))
 
 
 class Attempts:
@@ -137,13 +165,14 @@ class Attempts:
     def __iter__(self) -> Iterator[Attempt]:
         return iter(list(self._running.values()))
 
-    def __len__(self) -> int:
-        return len(self._running)
-
     def by_lane(self) -> dict[Lane, int]:
         """Return how many workers each lane holds."""
         held = Counter(attempt.job.lane for attempt in self if not attempt.at_once)
         return {lane: held[lane] + self.reserved[lane] for lane in LANES}
+
+    def leave_spare(self) -> bool:
+        """Say whether not all workers are held."""
+        return sum(self.by_lane().values()) < self._all
 
     def may_start(self, ready: int) -> tuple[Lane, ...]:
         """Return the lanes of which a job may start, in their order, when ``ready`` workers are warm."""
@@ -177,8 +206,7 @@ class Attempts:
         """Return of each that holds a worker its lane, how long it has run, and what its limit leaves it."""
         for each in self:
             if not each.at_once:
-                left_s = None if each.job.deadline is None else each.job.deadline - now
-                yield each.job.lane, now - each.begun_at, left_s
+                yield each.job.lane, now - each.begun_at, each.left_s(now)
 
     def ran(self, lane: Lane, durations_s: Iterable[float]) -> None:
         """Note how long jobs of the lane took."""
@@ -203,13 +231,9 @@ class Attempts:
         """
         busy = tuple(running)
         own = [each for each in busy if each[0] == lane]
-        if len(own) >= self._most[lane]:
-            seconds = min(self._rest(*each) for each in own)
-        elif len(busy) >= self._all:
-            seconds = min(self._rest(*each) for each in busy)
-        else:
-            seconds = self._mean(lane) / self._most[lane]
-        return max(1.0, seconds)
+        rests = [self._rest(*each) for each in (own if len(own) >= self._most[lane] else busy)]
+        is_free = len(own) < self._most[lane] and len(busy) < self._all
+        return max(1.0, self._mean(lane) / self._most[lane] if is_free else min(rests))
 
     def _rest(self, lane: Lane, ran_s: float, left_s: float | None) -> float:
         """Return how long a job that runs is expected to go on."""
@@ -254,22 +278,10 @@ class Writer:
         await asyncio.to_thread(self._thread.shutdown)
 
 
-async def complete(
-    attempt: Attempt, outcome: Outcome, store: JobStore, writer: Writer, grace_s: float
-) -> Job | None:
-    """Bring an outcome into the table; None if the job has gone on without this attempt.
-
-    Parameters
-    ----------
-    attempt, outcome
-        What has ended, and how.
-    store, writer
-        The job table, and its writer.
-    grace_s
-        How long work may go on after its time limit, for the reason of a job that did longer.
-    """
+async def complete(attempt: Attempt, outcome: Outcome, store: JobStore, writer: Writer) -> Job | None:
+    """Bring the outcome of an attempt into the table; None if the job has gone on without this attempt."""
     job, progress, write = attempt.job, attempt.progress, writer.write_with_retry
-    kind, which = store.kinds[job.kind], (job.id, job.attempt)
+    which = job.id, job.attempt
     if isinstance(outcome, Returned):
         try:
             return await write(store.succeed, *which, outcome.work, progress)
@@ -283,12 +295,13 @@ async def complete(
         return await write(store.fail, *which, outcome.error, progress)
     # What nothing has begun with waits again, and so does one whose time is up, where there is an answer for
     # those.
-    waits = kind.at_once is not None and not (attempt.at_once or attempt.asked_to_stop)
+    waits = attempt.kind.at_once is not None and not (attempt.at_once or attempt.asked_to_stop)
     if not outcome.begun or attempt.killed_for == "stop" or (attempt.killed_for == "time" and waits):
         return await write(store.requeue, *which, progress)
     if attempt.killed_for == "time":
         detail = said(
-            "the work did not stop within {seconds} s after its time was up, and was ended", seconds=grace_s
+            "the work did not stop within {seconds} s after its time was up, and was ended",
+            seconds=attempt.grace_s,
         )
         return await write(store.fail, *which, failure("time-limit-exceeded", detail), progress)
     _log.warning("attempt %d of a job: %s", job.attempt, outcome.reason)

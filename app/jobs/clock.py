@@ -82,11 +82,9 @@ class Loop:
             self._woken.clear()
             try:
                 pause_s = await self._step()
-            except STORE_IS_AWAY as error:
-                _log.error("%s; there will be another try: %s", self._failure, first_line(error))
-                await asyncio.sleep(self._again_s)
-            except Exception:
-                _log.exception("%s; there will be another try", self._failure)
+            except Exception as error:
+                at = None if isinstance(error, STORE_IS_AWAY) else error
+                _log.error("%s; there will be another try: %s", self._failure, first_line(error), exc_info=at)
                 await asyncio.sleep(self._again_s)
             else:
                 await wait_for(self._woken, pause_s)

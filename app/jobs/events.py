@@ -139,10 +139,7 @@ class EventStreams:
 
     def open(self, job_id: str) -> JobEvents:
         """Return a job's events, new ones if nobody has them."""
-        events = self._known.get(job_id)
-        if events is None:
-            events = self._known[job_id] = JobEvents()
-        return events
+        return self._known.setdefault(job_id, JobEvents())
 
     def known(self, job_id: str) -> JobEvents | None:
         """Return a job's events if somebody has them."""
@@ -192,7 +189,7 @@ class EventStreams:
                         pause_s = _LOOK_FOR_PROGRESS_S
                     if not looked or (self._shared and events.is_due(_LOOK_FOR_PROGRESS_S)):
                         looked = True
-                        await self._catch_up(job_id, events)
+                        await self.catch_up(job_id, events)
                 if allowed is not None and not await allowed():
                     return
                 over = events.over.is_set()
@@ -209,8 +206,14 @@ class EventStreams:
         finally:
             self.listeners -= 1
 
-    async def _catch_up(self, job_id: str, events: JobEvents) -> None:
-        """Tell those who listen what the table says of a job that does not run here."""
+    async def catch_up(self, job_id: str, events: JobEvents) -> None:
+        """Tell those who listen what the table says of a job that does not run here.
+
+        Raises
+        ------
+        JobNotFound
+            If no job has that id.
+        """
         job = await asyncio.to_thread(self._store.look, job_id)
         # While that was read, it may have begun to run here, or what is read may be of before.
         if not events.over.is_set() and not self._runs(job_id):

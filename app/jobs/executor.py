@@ -240,14 +240,14 @@ class Executor(ABC):
         work: str,
         payload: Mapping[str, Any],
         *,
-        time_left_s: float | None,
-        on_progress: Callable[[Progress], None],
+        time_left_s: float | None = None,
+        on_progress: Callable[[Progress], None] = lambda _progress: None,
         labels: Mapping[str, str] = MappingProxyType({}),
     ) -> Execution:
         """Hand ``"module:function"`` and its payload to the next free worker; never blocks.
 
         The lines that the worker logs in its course have the ``labels``, ids by their names.
-        ``time_left_s`` may be negative: the work still runs, and sees that its time is up.
+        ``time_left_s`` may be negative: the work still runs, and sees that its time is up; None: no limit.
         """
         deadline = math.inf if time_left_s is None else time.monotonic() + time_left_s
         execution = Execution(self, Work(work, payload, dict(labels), deadline, on_progress))
@@ -269,12 +269,6 @@ class Executor(ABC):
         for keeper in self._keepers:
             keeper.cancel()
         await asyncio.gather(*self._keepers, return_exceptions=True)
-
-    def _give_back_what_waits(self) -> None:
-        """End executions that no worker has begun with, as none is left: until one is warm takes a while."""
-        for execution in tuple(self._executions):
-            if execution.worker is None:
-                execution.kill()
 
     @abstractmethod
     def _new_worker(self) -> Worker:
@@ -312,5 +306,7 @@ class Executor(ABC):
         finally:
             self.ready -= warm
             if warm and not self.ready:
-                self._give_back_what_waits()
+                # Until one is warm takes a while: what none has begun with is given back.
+                for waiting in [each for each in self._executions if each.worker is None]:
+                    waiting.kill()
             await worker.discard()

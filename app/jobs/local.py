@@ -32,7 +32,7 @@ from app.jobs import worker
 from app.jobs.errors import describe
 from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Work
 from app.jobs.model import Progress
-from app.jobs.work_context import CANCEL, DEADLINE, HELD, SHARE, new_control
+from app.jobs.worker import CANCEL, DEADLINE, HELD, SHARE, new_control
 
 _starting = threading.Lock()
 
@@ -58,7 +58,9 @@ class LocalExecutor(Executor):
             return _Worker(multiprocessing.get_context("spawn"), self._log_level, self._environment)
         forkserver.set_forkserver_preload([self._preload])
         context = multiprocessing.get_context("forkserver")
-        return _Worker(context, self._log_level, self._environment | _same_modules())
+        # It finds modules where this process does, and nowhere else.
+        modules = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+        return _Worker(context, self._log_level, self._environment | modules)
 
 
 class _Worker:
@@ -73,10 +75,7 @@ class _Worker:
     """
 
     def __init__(
-        self,
-        context: SpawnContext | ForkServerContext,
-        log_level: str | None,
-        environment: Mapping[str, str],
+        self, context: SpawnContext | ForkServerContext, log_level: str | None, environment: Mapping[str, str]
     ) -> None:
         self._pipe, theirs = context.Pipe()
         self._control = cast("MutableSequence[float]", context.RawArray(ctypes.c_double, new_control()))
@@ -86,7 +85,6 @@ class _Worker:
         # Not one of those that requests need: a large payload takes a while.
         self._sender = ThreadPoolExecutor(1, "worker-send")
         self._loop = asyncio.get_running_loop()
-        self._started: asyncio.Future[None] = self._loop.create_future()
         self._gone = asyncio.Event()
         self._doomed = False
         self._on_progress: Callable[[Progress], None] | None = None
@@ -94,9 +92,7 @@ class _Worker:
         # Multiprocessing waits at the end of this process for those that it has made.
         atexit.register(self.kill)
         # A thread of its own: a fork server answers only when it has loaded, and requests need the others.
-        thread = threading.Thread(target=self._live, args=(theirs, environment), daemon=True)
-        thread.name = "worker-start"
-        thread.start()
+        threading.Thread(None, self._live, "worker-start", (theirs, environment), daemon=True).start()
 
     @property
     def name(self) -> str:
@@ -109,7 +105,6 @@ class _Worker:
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the process died idle: its slot brings another."""
-        await asyncio.shield(self._started)  # who gives up does not take it from the thread that sets it
         if self._gone.is_set():
             return None
         self._on_progress, self._outcome = work.on_progress, self._loop.create_future()
@@ -153,14 +148,13 @@ class _Worker:
         try:
             with _environment(environment):
                 self._process.start()
-        except Exception as error:  # whatever it is, it is raised where the start is waited for
-            self._call(self._started.set_exception, error)
+        except Exception as error:  # whatever it is, the slot has sent its first work, and learns of it
+            self._call(self._hear, Raised(describe(error), traceback.format_exc()))
         else:
             # Once only the worker has the other end, the pipe closes when the worker dies.
             theirs.close()
             if self._doomed:
                 self.kill()
-            self._call(self._started.set_result, None)
             # One that sends what cannot be read is no better than a dead one.
             with contextlib.suppress(Exception):
                 while True:
@@ -187,11 +181,6 @@ class _Worker:
         self._sender.shutdown(wait=False)
         if not self._outcome.done():
             self._outcome.set_result(Lost(f"worker process {self.name} died"))
-
-
-def _same_modules() -> dict[str, str]:
-    """Return the variables by which a fork server finds modules where this process does, and nowhere else."""
-    return {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 @contextlib.contextmanager

@@ -239,10 +239,6 @@ class WorkResult:
     unfinished: bool = False
 
 
-def _the_least(_payload: Mapping[str, Any]) -> float:
-    return 1.0
-
-
 @dataclass(frozen=True, slots=True)
 class FollowUp:
     """What completes a result.
@@ -271,7 +267,7 @@ class JobKind:
         Its name in :meth:`app.jobs.service.JobService.submit`.
     work
         ``"module:function"``, resolved only in the worker; the function takes the payload and a
-        :class:`app.jobs.work_context.WorkContext` and returns a :class:`WorkResult`.
+        :class:`app.jobs.worker.WorkContext` and returns a :class:`WorkResult`.
     lane
         ``"interactive"`` for what somebody waits for, ``"batch"`` for what comes by the hundred,
         ``"training"`` for what takes long.
@@ -300,7 +296,7 @@ class JobKind:
     dropped_fields: frozenset[str] = frozenset()
     at_once: str | None = None
     max_run_s: float | None = None
-    effort: Callable[[Mapping[str, Any]], float] = _the_least
+    effort: Callable[[Mapping[str, Any]], float] = lambda _payload: 1.0
     follow_up: FollowUp | None = None
 
 

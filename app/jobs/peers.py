@@ -2,7 +2,8 @@
 
 On SQLite there are none. On PostgreSQL what is told is only a hint to look, and may get lost: waiting jobs
 and dead owners are looked for once a lease, cancellations with every heartbeat, and those who wait for a job
-look at the table now and then.
+look at the table now and then. With every heartbeat, on SQLite too, a service compares what runs in it with
+what the table says of that.
 
 An owner that was not seen for a lease, by the database's clock, is dead, and its jobs are given back. If it
 lives on after all (it was suspended, or cut off), nothing is finished twice: its attempts are outdated from
@@ -16,15 +17,14 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import sqlalchemy as sa
 
 from app.jobs.attempts import Writer
 from app.jobs.model import JobStatus
-from app.jobs.queries import Announcements
 from app.jobs.store import JobStore
-from app.jobs.tables import DATABASE_NOW, jobs, owners
+from app.jobs.tables import DATABASE_NOW, Announcements, jobs, owners
 
 _CHANNEL = "allocator_jobs"
 _BEATS_A_LEASE = 5
@@ -35,13 +35,6 @@ News = Literal["waiting", "ended", "cancelled"]
 
 Hear = Callable[[str, str], None]
 """Gets what is heard and of which lane or job; two empty strings where something may have been missed."""
-
-
-class OwnedJob(NamedTuple):
-    """A job that this service runs, as the table has it."""
-
-    attempt: int
-    cancel_requested: bool
 
 
 class Peers:
@@ -61,13 +54,14 @@ class Peers:
     lease_s
         The same; infinite where there can be no others.
     beat_s
-        Seconds between two heartbeats; None where nobody waits for one.
+        Seconds between two heartbeats.
     """
 
     def __init__(self, store: JobStore, lease_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._store, self._owner, self._clock = store, store.owner, clock
-        self.lease_s = lease_s if store.database.shared else math.inf
-        self.beat_s = lease_s / _BEATS_A_LEASE if store.database.shared else None
+        self._shared = store.database.shared
+        self.lease_s = lease_s if self._shared else math.inf
+        self.beat_s = lease_s / _BEATS_A_LEASE
         self._announcements: Announcements | None = None
         self._beaten = float("-inf")
         self._judges_from = float("inf")
@@ -77,7 +71,7 @@ class Peers:
 
         What is told is given to ``hear`` on the event loop.
         """
-        if not self._store.database.shared:
+        if not self._shared:
             return
         await writer.write_with_retry(self.beat)
         loop = asyncio.get_running_loop()
@@ -97,24 +91,33 @@ class Peers:
             with contextlib.suppress(Exception):
                 await writer.write(self.forget)
 
-    def beat(self) -> dict[str, OwnedJob]:
-        """Show that this service lives, and return the jobs that the table says it runs, by their id. Blocks.
+    def beat(self) -> dict[str, tuple[int, bool]]:
+        """Show that this service lives, and return which jobs the table says it runs. Blocks.
+
+        Where there can be no others, nothing is written.
 
         After a time in which it could not, the others could not either: no service counts as dead until all
         that live have had the time of a lease to show themselves.
+
+        Returns
+        -------
+        dict
+            Of each job by its id the attempt, and whether it is to be cancelled.
         """
         begun = self._clock()
         me, mine = owners.c.owner == self._owner, jobs.c.owner == self._owner
         running = sa.select(jobs.c.id, jobs.c.attempt, jobs.c.cancel_requested)
-        with self._store.database.write() as connection:
-            if not connection.execute(sa.update(owners).where(me).values(seen_at=DATABASE_NOW)).rowcount:
+        seen = sa.update(owners).where(me).values(seen_at=DATABASE_NOW)
+        database = self._store.database
+        with database.write() if self._shared else database.read() as connection:
+            if self._shared and not connection.execute(seen).rowcount:
                 connection.execute(sa.insert(owners).values(owner=self._owner, seen_at=DATABASE_NOW))
             rows = connection.execute(running.where(mine, jobs.c.status == JobStatus.RUNNING)).all()
         self._store.follow_database()
         if begun - self._beaten > self.lease_s / 2:
             self._judges_from = begun + self.lease_s
         self._beaten = begun
-        return {job_id: OwnedJob(attempt, cancel_requested) for job_id, attempt, cancel_requested in rows}
+        return {row.id: (row.attempt, row.cancel_requested) for row in rows}
 
     def is_alive(self, owner: str) -> bool:
         """Say whether an owner can still finish its jobs: it was seen within the lease. Blocks.
@@ -122,10 +125,8 @@ class Peers:
         Yes, as long as this one must not judge. Where there can be no others, all but this one have ended,
         or the database would be occupied.
         """
-        if owner == self._owner:
-            return True
-        if not self._store.database.shared:
-            return False
+        if owner == self._owner or not self._shared:
+            return owner == self._owner
         if self._clock() < self._judges_from:
             return True
         age = sa.select(DATABASE_NOW - owners.c.seen_at).where(owners.c.owner == owner)

@@ -5,11 +5,9 @@ Nothing here changes the table, or waits for one who does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
@@ -18,7 +16,7 @@ from app.jobs.clock import Clock
 from app.jobs.errors import InvalidCursor, JobNotFound
 from app.jobs.model import LANES, Job, JobPage, JobStatus, JobSummary, Lane, Progress
 from app.jobs.stored_json import read_later
-from app.jobs.tables import artifacts, jobs
+from app.jobs.tables import Database, artifacts, jobs
 
 _MOST_UNFINISHED = 1000
 """Results that wait to be completed, at most; one more stays as it is."""
@@ -28,6 +26,7 @@ _LEFT_ALONE_S = 60.0
 
 Row = RowMapping | dict[str, Any]
 
+is_queued = jobs.c.status == JobStatus.QUEUED
 has_artifact = sa.exists().where(artifacts.c.job_id == jobs.c.id).label("has_artifact")
 _TEXTS = {"payload", "result"}
 # As texts, which most of those who handle a job only hand on.
@@ -41,44 +40,6 @@ select_small = sa.select(*(column for column in jobs.c if column.name not in _LA
 select_summaries = select_small.add_columns(jobs.c.assignment)
 # What is read in order to be changed is locked, where a database does not let writers take turns.
 select_to_change = select_jobs.with_for_update(of=jobs)
-
-
-class Announcements(Protocol):
-    """Short messages between the services that share a database; one may get lost."""
-
-    def tell(self, message: str) -> None:
-        """Send a message soon; never blocks."""
-
-    def close(self) -> None:
-        """End; what was told is sent if that is possible."""
-
-
-class Database(Protocol):
-    """What the jobs room needs of a database."""
-
-    shared: bool
-    """Whether several services may work on it; otherwise transactions that write take turns."""
-
-    def occupy(self) -> None:
-        """Keep other services off, where it is not shared."""
-
-    def vacate(self) -> None:
-        """Let another service have it."""
-
-    def write(self) -> AbstractContextManager[Connection]:
-        """Open a write transaction, committed at its end and rolled back by an exception."""
-
-    def read(self) -> AbstractContextManager[Connection]:
-        """Open a read transaction."""
-
-    def migrate(self, script_location: Path, version_table: str) -> None:
-        """Bring the tables of an Alembic folder to its newest version."""
-
-    def take_turn(self, connection: Connection, name: str) -> None:
-        """Let the transactions that call this with one name follow one another."""
-
-    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
-        """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
 
 
 class JobQueries:
@@ -108,8 +69,7 @@ class JobQueries:
         JobNotFound
             If no job has that id.
         """
-        with self.database.read() as connection:
-            return job_of(find(connection, job_id, select_jobs))
+        return job_of(self._find(job_id, select_jobs))
 
     def look(self, job_id: str) -> JobSummary:
         """Return a job without its payload and result.
@@ -119,8 +79,7 @@ class JobQueries:
         JobNotFound
             If no job has that id.
         """
-        with self.database.read() as connection:
-            return summary_of(find(connection, job_id, select_summaries))
+        return summary_of(self._find(job_id, select_summaries))
 
     def result_text(self, job_id: str) -> str | None:
         """Return a job's result as JSON, as it is stored; None without one."""
@@ -137,8 +96,7 @@ class JobQueries:
             If no job has that id.
         """
         left = sa.select(jobs.c.id, artifacts.c.data).outerjoin(artifacts, artifacts.c.job_id == jobs.c.id)
-        with self.database.read() as connection:
-            data: bytes | None = find(connection, job_id, left)["data"]
+        data: bytes | None = self._find(job_id, left)["data"]
         return data
 
     def page(self, limit: int, cursor: str | None, status: JobStatus | None = None) -> JobPage:
@@ -165,24 +123,23 @@ class JobQueries:
             if not (cursor.isascii() and cursor.isdigit() and len(cursor) <= 18):
                 raise InvalidCursor(cursor)
             statement = statement.where(jobs.c.number < int(cursor))
-        with self.database.read() as connection:
-            rows = connection.execute(statement).mappings().all()
-        more = len(rows) > limit
-        rows = rows[:limit]
+        rows = self._rows(statement)
+        more, rows = len(rows) > limit, rows[:limit]
         return JobPage(tuple(summary_of(row) for row in rows), str(rows[-1]["number"]) if more else None)
 
     def waiting(self) -> dict[Lane, int]:
         """Return how many jobs wait in each lane."""
-        with self.database.read() as connection:
-            return {lane: waiting_in(connection, lane) for lane in LANES}
+        statement = sa.select(jobs.c.lane, sa.func.count().label("jobs")).where(is_queued)
+        counts = {row["lane"]: row["jobs"] for row in self._rows(statement.group_by(jobs.c.lane))}
+        return {lane: counts.get(lane, 0) for lane in LANES}
 
     def deadlines(self, kinds: Iterable[str]) -> dict[str, float]:
         """Return when the time of those waiting jobs of some kinds is up that have one, by their id."""
-        statement = sa.select(jobs.c.id, jobs.c.deadline).where(
-            jobs.c.status == JobStatus.QUEUED, jobs.c.deadline.is_not(None), jobs.c.kind.in_(list(kinds))
-        )
-        with self.database.read() as connection:
-            return {row.id: row.deadline for row in connection.execute(statement)}
+        ends = is_queued, jobs.c.deadline.is_not(None), jobs.c.kind.in_(list(kinds))
+        return {
+            row["id"]: row["deadline"]
+            for row in self._rows(sa.select(jobs.c.id, jobs.c.deadline).where(*ends))
+        }
 
     def next_unfinished(self, owner: str) -> Job | None:
         """Return the ended job whose result an owner is to complete next; None if there is none.
@@ -193,21 +150,23 @@ class JobQueries:
         if self.database.shared:
             left_alone = jobs.c.finished_at < self.clock.now() - _LEFT_ALONE_S
             statement = statement.where(sa.or_(jobs.c.owner == owner, left_alone))
-        statement = statement.order_by(jobs.c.unfinished, jobs.c.number).limit(1)
-        with self.database.read() as connection:
-            row = connection.execute(statement).mappings().first()
-        return None if row is None else job_of(row)
+        rows = self._rows(statement.order_by(jobs.c.unfinished, jobs.c.number).limit(1))
+        return job_of(rows[0]) if rows else None
 
     def recent_durations(self, lane: Lane, limit: int) -> list[float]:
         """Return how long the newest succeeded jobs of a lane ran, in seconds, oldest first."""
-        statement = (
-            sa.select(jobs.c.finished_at - jobs.c.started_at)
-            .where(jobs.c.status == JobStatus.SUCCEEDED, jobs.c.lane == lane)
-            .order_by(jobs.c.number.desc())
-            .limit(limit)
-        )
+        took = sa.select((jobs.c.finished_at - jobs.c.started_at).label("s"))
+        succeeded = took.where(jobs.c.status == JobStatus.SUCCEEDED, jobs.c.lane == lane)
+        rows = self._rows(succeeded.order_by(jobs.c.number.desc()).limit(limit))
+        return [float(row["s"]) for row in reversed(rows)]
+
+    def _rows(self, statement: sa.Select[Any]) -> Sequence[RowMapping]:
         with self.database.read() as connection:
-            return [float(seconds) for seconds in connection.scalars(statement)][::-1]
+            return connection.execute(statement).mappings().all()
+
+    def _find(self, job_id: str, select: sa.Select[Any]) -> RowMapping:
+        with self.database.read() as connection:
+            return find(connection, job_id, select)
 
 
 def find(connection: Connection, job_id: str, select: sa.Select[Any]) -> RowMapping:
@@ -224,16 +183,14 @@ def find(connection: Connection, job_id: str, select: sa.Select[Any]) -> RowMapp
     return row
 
 
-def waiting_in(connection: Connection, lane: Lane) -> int:
-    """Return how many jobs wait in a lane."""
-    waits = jobs.c.status == JobStatus.QUEUED, jobs.c.lane == lane
-    return connection.execute(sa.select(sa.func.count()).where(*waits)).scalar_one()
+def count(connection: Connection, *which: sa.ColumnElement[bool]) -> int:
+    """Return how many jobs there are of which all that is true."""
+    return connection.execute(sa.select(sa.func.count()).where(*which)).scalar_one()
 
 
 def has_place(connection: Connection) -> bool:
     """Say whether one more result can wait to be completed."""
-    others = sa.select(sa.func.count()).where(jobs.c.unfinished.is_not(None))
-    return connection.execute(others).scalar_one() < _MOST_UNFINISHED
+    return count(connection, jobs.c.unfinished.is_not(None)) < _MOST_UNFINISHED
 
 
 def progress_columns(progress: Progress) -> dict[str, Any]:

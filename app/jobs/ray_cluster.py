@@ -26,9 +26,9 @@ from typing import Any
 
 from app.jobs import worker
 from app.jobs.errors import describe
-from app.jobs.executor import Executor, Lost, Message, Outcome, Raised, Returned, Work
+from app.jobs.executor import Executor, Lost, Outcome, Raised, Returned, Work
 from app.jobs.model import Progress
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.logs import configure_worker_logs
 
 REPORT_INTERVAL_S = 0.5
@@ -38,7 +38,7 @@ OWN_CLUSTER = "local"
 """An address for which a cluster is started on this machine, and ended with the executor."""
 
 _UNHEARD_S = 0.05
-"""Work that has ended by then is not asked for its progress; the last one comes with its end."""
+"""Of work that has ended by then no progress is sent but the last, which comes with its end."""
 
 _TALK = "talk"
 _TALKERS = 4
@@ -148,23 +148,28 @@ class _Worker:
         self.name: str = actor._actor_id.hex()[:12]
         self._gone = False
         self._serial = 0
+        self._on_progress: Callable[[Progress], None] | None = None
         self._newest: Progress | None = None
 
     async def stay(self) -> None:
-        """Wait until the process is gone."""
+        """Deliver the progress as it comes, until the process is gone."""
+        call = self._actor.progress.options(concurrency_group=_TALK, num_returns="streaming")
         with contextlib.suppress(self._ray.exceptions.RayError):
-            await self._actor.stay.options(concurrency_group=_TALK).remote()
+            async for sent in call.remote():
+                serial, progress = await sent
+                if serial == self._serial and self._on_progress is not None:
+                    self._newest = progress
+                    self._on_progress(progress)
 
     async def run(self, work: Work, cancelled: bool) -> Outcome | None:
         """Do one piece of work; None if the actor was gone before."""
         if self._gone:
             return None
-        self._serial, self._newest = next(_serials), None
+        self._serial, self._on_progress, self._newest = next(_serials), work.on_progress, None
         left = None if math.isinf(work.deadline) else work.deadline - time.monotonic()
-        listening = asyncio.create_task(self._listen(self._serial, work.on_progress))
-        call = work.labels, work.function, work.payload, left, cancelled
+        call = self._serial, work.labels, work.function, work.payload, left, cancelled
         try:
-            progress, outcome = await self._actor.run.remote(self._serial, *call)
+            progress, outcome = await self._actor.run.remote(*call)
         except Exception as error:
             errors = self._ray.exceptions
             if isinstance(error, errors.RayError) and not isinstance(error, errors.RayTaskError):
@@ -173,22 +178,11 @@ class _Worker:
             # What was to be sent, or what came back, cannot be pickled; the worker is well.
             return Raised(describe(error), traceback.format_exc())
         finally:
-            listening.cancel()
+            self._on_progress = None
         if progress is not None and progress != self._newest:
             work.on_progress(progress)
         ended: Outcome = outcome
         return ended
-
-    async def _listen(self, serial: int, on_progress: Callable[[Progress], None]) -> None:
-        """Deliver the progress as it comes, not more often than ``REPORT_INTERVAL_S``."""
-        count = 0
-        await asyncio.sleep(_UNHEARD_S)
-        with contextlib.suppress(self._ray.exceptions.RayError):
-            call = self._actor.progress_after.options(concurrency_group=_TALK)
-            while (news := await call.remote(serial, count)) is not None:
-                count, self._newest = news
-                on_progress(news[1])
-                await asyncio.sleep(REPORT_INTERVAL_S)
 
     def cancel(self) -> None:
         """Raise the flag that the work polls."""
@@ -213,7 +207,7 @@ class _Worker:
 class RayWorker:
     """A worker of the cluster.
 
-    The work is done in one thread, calls about it come in others; what they share is guarded by a condition.
+    The work is done in one thread, calls about it come in others.
 
     Parameters
     ----------
@@ -224,16 +218,21 @@ class RayWorker:
     def __init__(self, log_level: str | None) -> None:
         if log_level is not None:
             configure_worker_logs(log_level)
-        self._changed = threading.Condition()
-        self._reporter = worker.Reporter(self._take, worker.REPORT_INTERVAL_S)
-        self._context = WorkContext(self._reporter.report)
-        self._serial = self._cancelled = self._count = 0
+        self._lock, self._news = threading.Lock(), threading.Event()
+        self._context = WorkContext(self._report)
+        self._serial = self._cancelled = 0
         self._progress: Progress | None = None
-        self._outcome: Returned | Raised | None = None
 
-    def stay(self) -> None:
-        """Never return: a caller that waits for it learns that this process has died."""
-        threading.Event().wait()
+    def progress(self) -> Iterator[tuple[int, Progress]]:
+        """Yield the newest progress with the serial of its work, again and again while the process lives."""
+        while True:
+            self._news.wait()
+            time.sleep(_UNHEARD_S)
+            self._news.clear()
+            serial, progress = self._serial, self._progress
+            if progress is not None:
+                yield serial, worker.clean(progress)
+                time.sleep(REPORT_INTERVAL_S)
 
     def run(
         self,
@@ -243,13 +242,13 @@ class RayWorker:
         payload: Mapping[str, Any],
         time_left_s: float | None,
         cancelled: bool,
-    ) -> tuple[Progress | None, Returned | Raised | None]:
+    ) -> tuple[Progress | None, Returned | Raised]:
         """Do one piece of work, and return its last progress and its outcome.
 
         Parameters
         ----------
         serial
-            Tells this work from others in calls about it; it grows.
+            Tells this work from others in calls about it.
         labels
             What the lines have that are logged meanwhile.
         work, payload
@@ -259,45 +258,23 @@ class RayWorker:
         cancelled
             Whether it was to stop before it was sent: calls about it may come here after it has begun.
         """
-        context = WorkContext.in_process(self._reporter.report, time_left_s)
-        with self._changed:
-            self._serial, self._context, self._progress, self._count = serial, context, None, 0
+        context = WorkContext.in_process(self._report, time_left_s)
+        with self._lock:
+            self._serial, self._context = serial, context
             if cancelled or self._cancelled == serial:
                 context.cancel()
-        worker.perform(labels, work, payload, context, self._reporter)
-        with self._changed:
-            self._serial = -serial
-            self._changed.notify_all()
-            return self._progress, self._outcome
+        ended: list[Returned | Raised] = []
+        worker.perform(labels, work, payload, context, ended.append)
+        progress, self._progress = self._progress, None
+        return None if progress is None else worker.clean(progress), ended[0]
 
-    def _take(self, message: Message) -> None:
-        """Take note of what the work sends."""
-        with self._changed:
-            if isinstance(message, Progress):
-                self._progress, self._count = message, self._count + 1
-                self._changed.notify_all()
-            else:
-                self._outcome = message
-
-    def progress_after(self, serial: int, count: int) -> tuple[int, Progress] | None:
-        """Wait until the work has reported more than ``count`` times; None once it has ended.
-
-        It may be called before the work has come here.
-        """
-
-        def has_news() -> bool:
-            ended = self._serial == -serial or abs(self._serial) > serial
-            return ended or (self._serial == serial and self._count > count)
-
-        with self._changed:
-            self._changed.wait_for(has_news)
-            if self._serial != serial or self._progress is None:
-                return None
-            return self._count, self._progress
+    def _report(self, progress: Progress) -> None:
+        self._progress = progress
+        self._news.set()
 
     def cancel(self, serial: int) -> None:
         """Ask the work to stop; also if it has been sent and not begun."""
-        with self._changed:
+        with self._lock:
             self._cancelled = serial
             if self._serial == serial:
                 self._context.cancel()

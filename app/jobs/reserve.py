@@ -110,7 +110,8 @@ class Reserve:
         self._kinds = [kind.name for kind in store.kinds.values() if kind.at_once is not None]
         self._efforts: dict[str, float] = {}
         self._pace = Pace()
-        self._busy = False
+        # Held while jobs are being answered.
+        self._answers = asyncio.Lock()
         self._execution: Execution | None = None
         self.answering = Loop(self._answer_due, "jobs whose time is up could not be answered")
         self.completing = Loop(self._complete_next, "a result could not be completed")
@@ -147,12 +148,9 @@ class Reserve:
             if in_s > 0:
                 return min(in_s, _LONGEST_LOOK_S)
             self._make_way()
-            self._busy = True
-            try:
+            async with self._answers:
                 for job_id, seconds in (await self._answer(due(waits, self._pace, now))).items():
                     self._pace.took(waits[job_id].effort, seconds)
-            finally:
-                self._busy = False
         return None
 
     def _make_way(self) -> None:
@@ -164,7 +162,7 @@ class Reserve:
         """Complete a result, unless that holds up somebody; return how long there is nothing to do."""
         if self._executor is None:
             return None
-        if self._busy or not (self._executor.ready and self._has_spare()):
+        if self._answers.locked() or not (self._executor.ready and self._has_spare()):
             return _PAUSE_S
         job = await asyncio.to_thread(self._store.next_unfinished, self._store.owner)
         if job is None:
@@ -172,31 +170,24 @@ class Reserve:
         kind = self._store.kinds.get(job.kind)
         if kind is None or kind.follow_up is None:
             # A version that has no such work any more.
-            await self._complete(job, {})
-            return 0.0
+            return await self._complete(job, {})
         payload = {**job.payload, "result": job.result}
-        self._execution = self._executor.submit(
-            kind.follow_up.work, payload, time_left_s=None, on_progress=_ignore, labels=job.labels
-        )
+        self._execution = self._executor.submit(kind.follow_up.work, payload, labels=job.labels)
         try:
             outcome = await self._execution.outcome()
         finally:
             self._execution = None
         if isinstance(outcome, Returned):
-            if not outcome.work.unfinished:
-                await self._complete(job, outcome.work.result)
-        elif not (self.completing.ended or (isinstance(outcome, Lost) and not outcome.begun)):
-            reason = outcome.error["detail"] if isinstance(outcome, Raised) else outcome.reason
-            _log.warning("a result is not completed: %s", reason, extra={"job_id": job.id})
-            await self._complete(job, kind.follow_up.given_up, failed=True)
-        return 0.0
+            return 0.0 if outcome.work.unfinished else await self._complete(job, outcome.work.result)
+        if self.completing.ended or (isinstance(outcome, Lost) and not outcome.begun):
+            return 0.0
+        reason = outcome.error["detail"] if isinstance(outcome, Raised) else outcome.reason
+        _log.warning("a result is not completed: %s", reason, extra={"job_id": job.id})
+        return await self._complete(job, kind.follow_up.given_up, failed=True)
 
-    async def _complete(self, job: Job, fields: Mapping[str, Any], *, failed: bool = False) -> None:
+    async def _complete(self, job: Job, fields: Mapping[str, Any], *, failed: bool = False) -> float:
         await self._writer.write(self._store.complete_result, job.id, job.attempt, fields, failed=failed)
-
-
-def _ignore(_progress: object) -> None:
-    """Nobody waits for it."""
+        return 0.0
 
 
 def latest_start(waits: Iterable[Wait], pace: Pace) -> float:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import platform
 import time
 import uuid
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from app.jobs.clock import Clock, wait_for
 from app.jobs.dispatcher import Dispatcher
+from app.jobs.errors import UnknownJobKind
 from app.jobs.executor import Executor
 from app.jobs.model import (
     LANES,
@@ -28,8 +31,9 @@ from app.jobs.model import (
     Lane,
     Load,
 )
-from app.jobs.queries import Database
 from app.jobs.store import JobStore
+from app.jobs.tables import Database
+from app.logs import labels
 
 # A waiter may miss the news of a job that another process runs, and looks at the table.
 _LOOK_AGAIN_S = 5.0
@@ -85,24 +89,16 @@ class JobService:
         observer: JobObserver | None = None,
         lease_s: float = 15.0,
     ) -> None:
-        places = dict.fromkeys(LANES, max_queued if isinstance(max_queued, int) else _PLACES)
-        places = places if isinstance(max_queued, int) else {**places, **max_queued}
+        some = dict.fromkeys(LANES, max_queued) if isinstance(max_queued, int) else max_queued
+        self._places = {**dict.fromkeys(LANES, _PLACES), **some}
         owner = f"{platform.node()}:{os.getpid()}:{uuid.uuid4().hex[:12]}"
         self._store = JobStore(database, owner, max_attempts, kinds, Clock())
-        self._dispatcher = Dispatcher(
-            self._store,
-            executor,
-            reserve,
-            observer,
-            places=places,
-            overrun_grace_s=overrun_grace_s,
-            retention_s=retention_s,
-            lease_s=lease_s,
-        )
+        rest = observer, overrun_grace_s, retention_s, lease_s
+        self._dispatcher = Dispatcher(self._store, executor, reserve, *rest)
         self._database, self._attempts = database, self._dispatcher.attempts
         self._events, self._runs = self._dispatcher.events, self._dispatcher.runs
         # Where nobody else can change a job, nothing happens to it that its events do not tell.
-        self._look_again_s = _LOOK_AGAIN_S if database.shared else None
+        self._look_again_s = _LOOK_AGAIN_S if database.shared else math.inf
         self._stopping: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -182,7 +178,19 @@ class JobService:
         IdempotencyMismatch
             If the key was seen with another body.
         """
-        return await self._dispatcher.admit(kind, payload, time_limit_s, idempotency)
+        if kind not in self._store.kinds:
+            raise UnknownJobKind(kind)
+        known = self._store.kinds[kind]
+        insert = partial(
+            self._store.insert,
+            known,
+            payload,
+            places=self._places[known.lane],
+            time_limit_s=time_limit_s,
+            idempotency=idempotency,
+            asked_by=labels(),
+        )
+        return await self._dispatcher.admit(known.lane, insert)
 
     async def get(self, job_id: str) -> Job:
         """Return a job with its newest progress.
@@ -274,21 +282,18 @@ class JobService:
         JobNotFound
             If no job has that id.
         """
-        end = None if timeout_s is None else time.monotonic() + timeout_s
+        end = math.inf if timeout_s is None else time.monotonic() + timeout_s
         events = self._events.open(job_id)
-        while True:
+        while not events.over.is_set():
             changed = events.changed
-            elsewhere = not events.over.is_set() and not self._runs(job_id)
-            if elsewhere and (await asyncio.to_thread(self._store.look, job_id)).status.finished:
-                return await self.get(job_id)
-            if events.over.is_set():
-                return events.ended or await self.get(job_id)
-            left = None if end is None else end - time.monotonic()
+            if not self._runs(job_id):
+                await self._events.catch_up(job_id, events)
+            pause_s = min(end - time.monotonic(), self._look_again_s)
             in_vain = self._stopping is not None and not self._runs(job_id)
-            if in_vain or (left is not None and left <= 0):
-                return await self.get(job_id)
-            pauses = [seconds for seconds in (left, self._look_again_s) if seconds is not None]
-            await wait_for(changed, min(pauses, default=None))
+            if events.over.is_set() or in_vain or pause_s <= 0:
+                break
+            await wait_for(changed, None if math.isinf(pause_s) else pause_s)
+        return events.ended or await self.get(job_id)
 
     async def wait_for_client(
         self, job_id: str, timeout_s: float | None, gone: Coroutine[Any, Any, object]

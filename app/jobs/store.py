@@ -15,6 +15,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
@@ -23,22 +24,21 @@ from sqlalchemy import Connection, RowMapping
 from app.jobs import queries
 from app.jobs.clock import Clock
 from app.jobs.errors import QueueFull, failure
-from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import FINISHED, LANES, Idempotency, Job, JobKind, JobStatus, Lane, Progress, WorkResult
-from app.jobs.queries import Database, JobQueries
+from app.jobs.queries import JobQueries, is_queued
 from app.jobs.stored_json import read_later
-from app.jobs.tables import DATABASE_NOW, artifacts, idempotency_keys, jobs
+from app.jobs.tables import DATABASE_NOW, Database, artifacts, claim_key, idempotency_keys, jobs, keep
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSION_TABLE = "alembic_version_jobs"
 
 _UNFINISHED = JobStatus.QUEUED, JobStatus.RUNNING
-_QUEUED, _RUNNING = jobs.c.status == JobStatus.QUEUED, jobs.c.status == JobStatus.RUNNING
+_RUNNING = jobs.c.status == JobStatus.RUNNING
 # Of each lane the job that has waited longest; one that another dispatcher is about to take is passed over,
 # where they do not take turns.
 _OLDEST = {
     lane: sa.select(jobs.c.number)
-    .where(_QUEUED, jobs.c.lane == lane)
+    .where(is_queued, jobs.c.lane == lane)
     .order_by(jobs.c.number)
     .limit(1)
     .with_for_update(skip_locked=True)
@@ -102,8 +102,7 @@ class JobStore(JobQueries):
         retry_after_s: float = 1.0,
         time_limit_s: float | None = None,
         idempotency: Idempotency | None = None,
-        request_id: str | None = None,
-        key_id: str | None = None,
+        asked_by: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Job, bool]:
         """Add a job, or find the one that was added with the same idempotency key.
 
@@ -114,8 +113,8 @@ class JobStore(JobQueries):
             another waits that comes before it.
         places, retry_after_s
             How many may wait in its lane, where it has to, and when one more is expected to have a place.
-        request_id, key_id
-            The request that asks for it, and its API key.
+        asked_by
+            The ids of the request and of its API key, by the names of their columns, where there are any.
 
         Returns
         -------
@@ -137,10 +136,10 @@ class JobStore(JobQueries):
             if not (self.database.shared or _is_there(connection, jobs.c.status.in_(_UNFINISHED))):
                 self.clock.follow()
             before = jobs.c.lane.in_(LANES[: LANES.index(kind.lane) + 1])
-            if not run_now or _is_there(connection, _QUEUED, before):
+            if not run_now or _is_there(connection, is_queued, before):
                 run_now = False
                 self.database.take_turn(connection, f"queue {kind.lane}")
-                if queries.waiting_in(connection, kind.lane) >= places:
+                if queries.count(connection, is_queued, jobs.c.lane == kind.lane) >= places:
                     raise QueueFull(kind.lane, places, retry_after_s)
             now = self.clock.now()
             row: dict[str, Any] = {
@@ -158,8 +157,8 @@ class JobStore(JobQueries):
                 "deadline": None if time_limit_s is None else now + time_limit_s,
                 "created_at": now,
                 "started_at": now if run_now else None,
-                "request_id": request_id,
-                "key_id": key_id,
+                "request_id": asked_by.get("request_id"),
+                "key_id": asked_by.get("key_id"),
             }
             connection.execute(sa.insert(jobs).values(row))
             if idempotency is not None:
@@ -181,7 +180,7 @@ class JobStore(JobQueries):
             # An earlier process may have had another idea of the time.
             started_at = sa.case((jobs.c.created_at > now, jobs.c.created_at), else_=now)
             begins = {"status": JobStatus.RUNNING, "attempt": jobs.c.attempt + 1, "owner": self.owner}
-            take = sa.update(jobs).where(which, _QUEUED).values(**begins, started_at=started_at)
+            take = sa.update(jobs).where(which, is_queued).values(**begins, started_at=started_at)
             rows = connection.execute(take.returning(*queries.whole, queries.has_artifact)).mappings().all()
             if not rows:
                 connection.rollback()  # nothing is there to be committed
@@ -217,18 +216,18 @@ class JobStore(JobQueries):
         """Mark a job failed, or cancelled if that was asked for; None if it went on without this attempt."""
         return self._end_attempt(job_id, attempt, JobStatus.FAILED, progress, error=error)
 
-    def requeue(self, job_id: str, attempt: int, progress: Progress | None) -> Job | None:
+    def requeue(self, job_id: str, attempt: int, progress: Progress) -> Job | None:
         """Put a job back into the queue that was stopped through no fault of its own.
 
-        Without a progress it keeps the one that is stored. A job that was to be cancelled is cancelled. None
-        if the job has gone on without this attempt.
+        A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
         """
         return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress)
 
-    def mark_crashed(self, job_id: str, attempt: int, reason: str, progress: Progress) -> Job | None:
+    def mark_crashed(self, job_id: str, attempt: int, reason: str, progress: Progress | None) -> Job | None:
         """Put a job back whose worker died: it waits again, or has failed if that was the last attempt.
 
-        A job that was to be cancelled is cancelled. None if the job has gone on without this attempt.
+        Without a progress it keeps the one that is stored. A job that was to be cancelled is cancelled. None
+        if the job has gone on without this attempt.
         """
         return self._end_attempt(job_id, attempt, JobStatus.QUEUED, progress, crash=reason)
 
@@ -296,23 +295,21 @@ class JobStore(JobQueries):
         list of Job
             Every job that was changed.
         """
-        stranger = _QUEUED, jobs.c.kind.not_in(list(self.kinds))
-        with self.database.read() as connection:
-            owners = connection.scalars(sa.select(jobs.c.owner).where(_RUNNING).distinct()).all()
-            strangers = connection.scalar(sa.select(sa.func.count()).where(*stranger))
-        dead = [owner for owner in owners if not alive(owner)]
-        changed: list[Job] = []
-        if not dead and not strangers:
-            return changed
+        owners = [row["owner"] for row in self._rows(sa.select(jobs.c.owner).where(_RUNNING).distinct())]
+        left = sa.and_(_RUNNING, jobs.c.owner.in_([owner for owner in owners if not alive(owner)]))
+        which = sa.or_(left, sa.and_(is_queued, jobs.c.kind.not_in(list(self.kinds))))
+        if not self._rows(sa.select(jobs.c.number).where(which).limit(1)):
+            return []
         with self.database.write() as connection:
-            left = queries.select_to_change.where(_RUNNING, jobs.c.owner.in_(dead))
-            for row in connection.execute(left).mappings().all():
-                reason = "the service stopped in its midst"
-                changed.append(self._move(connection, row, JobStatus.QUEUED, crash=reason))
-            for row in connection.execute(queries.select_to_change.where(*stranger)).mappings().all():
-                error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
-                changed.append(self._move(connection, row, JobStatus.FAILED, error=error))
-        return changed
+            rows = connection.execute(queries.select_to_change.where(which)).mappings().all()
+            return [self._give_back(connection, row) for row in rows]
+
+    def _give_back(self, connection: Connection, row: RowMapping) -> Job:
+        if row["status"] == JobStatus.RUNNING:
+            reason = "the service stopped in its midst"
+            return self._move(connection, row, JobStatus.QUEUED, crash=reason)
+        error = failure("unknown-job-kind", f"this version has no jobs of kind {row['kind']!r}")
+        return self._move(connection, row, JobStatus.FAILED, error=error)
 
     def complete_result(
         self, job_id: str, attempt: int, fields: Mapping[str, Any], *, failed: bool = False

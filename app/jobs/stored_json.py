@@ -15,7 +15,7 @@ from pydantic_core import PydanticSerializationError, from_json, to_json
 _SMALL = 10_000
 """Characters of a text that is read at once."""
 
-_NOT_FINITE = b"NaN", b"Infinity"
+_NOT_FINITE = "NaN", "Infinity"
 
 
 class StoredJson(Mapping[str, Any]):
@@ -84,13 +84,10 @@ def written(value: Mapping[str, Any]) -> StoredJson:
     TypeError, ValueError
         If it is not JSON-ready: something in it is of another type, or not a finite number.
     """
-    try:
-        text = to_json(value)
-    except (PydanticSerializationError, UnicodeEncodeError):
-        return StoredJson(json.dumps(value, allow_nan=False), is_new=True)
+    text = write(value)
     if any(each in text for each in _NOT_FINITE):
         json.dumps(value, allow_nan=False)  # it may be in a name
-    return StoredJson(text.decode(), is_new=True)
+    return StoredJson(text, is_new=True)
 
 
 def read_later(stored: Any) -> Any:

@@ -1,14 +1,146 @@
-"""The tables of the jobs room, as the newest migration leaves them.
+"""The tables of the jobs room, as the newest migration leaves them, and what it needs of a database.
 
 Times are seconds since 1970 UTC: they are compared and subtracted, and the sort is the same in every
 database. ``jobs.number`` counts submissions: it is the order of the queue and of the pages.
+
+What came with an idempotency key comes once. A key is kept in the transaction that makes what it stands for,
+and goes with it; :func:`key_table` makes tables of keys of whatever they began.
 """
 
 from __future__ import annotations
 
-import sqlalchemy as sa
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Protocol
 
-from app.jobs.idempotency import key_table
+import sqlalchemy as sa
+from sqlalchemy import Connection
+
+from app.jobs.errors import IdempotencyMismatch
+from app.jobs.model import Idempotency
+
+
+class Announcements(Protocol):
+    """Short messages between the services that share a database; one may get lost."""
+
+    def tell(self, message: str) -> None:
+        """Send a message soon; never blocks."""
+
+    def close(self) -> None:
+        """End; what was told is sent if that is possible."""
+
+
+class Database(Protocol):
+    """What the jobs room needs of a database."""
+
+    shared: bool
+    """Whether several services may work on it; otherwise transactions that write take turns."""
+
+    def occupy(self) -> None:
+        """Keep other services off, where it is not shared."""
+
+    def vacate(self) -> None:
+        """Let another service have it."""
+
+    def write(self) -> AbstractContextManager[Connection]:
+        """Open a write transaction, committed at its end and rolled back by an exception."""
+
+    def read(self) -> AbstractContextManager[Connection]:
+        """Open a read transaction."""
+
+    def migrate(self, folder: Path, version_table: str) -> None:
+        """Bring tables to the newest version of a folder of Alembic migrations."""
+
+    def take_turn(self, connection: Connection, name: str) -> None:
+        """Let the transactions that call this with one name follow one another."""
+
+    def announcements(self, channel: str, heard: Callable[[str | None], None]) -> Announcements:
+        """Open a channel; ``heard`` is called in a thread, with None if messages may have been lost."""
+
+
+def key_table(metadata: sa.MetaData, name: str, of: str, ids: str) -> sa.Table:
+    """Return a table of keys.
+
+    Parameters
+    ----------
+    metadata
+        Where it belongs.
+    name
+        Of the table.
+    of
+        Of the column with the id of what a key stands for.
+    ids
+        The column that it refers to, as ``table.column``.
+    """
+    return sa.Table(
+        name,
+        metadata,
+        sa.Column("client", sa.String(255), primary_key=True),
+        sa.Column("key", sa.String(255), primary_key=True),
+        sa.Column("body_hash", sa.String(128), nullable=False),
+        sa.Column(of, sa.String(32), sa.ForeignKey(ids, ondelete="CASCADE"), nullable=False, index=True),
+    )
+
+
+def known_by(connection: Connection, keys: sa.Table, idempotency: Idempotency) -> str | None:
+    """Return the id of what came with the same key before; None if nothing did.
+
+    Parameters
+    ----------
+    connection
+        Of a transaction.
+    keys
+        A table of :func:`key_table`.
+    idempotency
+        The key.
+
+    Raises
+    ------
+    IdempotencyMismatch
+        If the key came with another body.
+    """
+    same = keys.c.client == idempotency.client, keys.c.key == idempotency.key
+    found = connection.execute(sa.select(keys).where(*same)).one_or_none()
+    if found is None:
+        return None
+    _, _, body_hash, begun = found
+    if body_hash != idempotency.body_hash:
+        raise IdempotencyMismatch(idempotency.key, f"{_of(keys).removesuffix('_id')} {begun!r}")
+    return str(begun)
+
+
+def claim_key(
+    database: Database, connection: Connection, keys: sa.Table, idempotency: Idempotency
+) -> str | None:
+    """Return the same in a transaction that writes; until its end no other one claims the key.
+
+    Parameters
+    ----------
+    database
+        Whose transaction it is.
+    connection, keys, idempotency
+        As of :func:`known_by`.
+
+    Raises
+    ------
+    IdempotencyMismatch
+        As :func:`known_by` does.
+    """
+    database.take_turn(connection, f"key {idempotency.client} {idempotency.key}")
+    return known_by(connection, keys, idempotency)
+
+
+def keep(connection: Connection, keys: sa.Table, idempotency: Idempotency, begun: str) -> None:
+    """Keep a key with the id of what it stands for, in the transaction that makes that."""
+    connection.execute(sa.insert(keys).values({**asdict(idempotency), _of(keys): begun}))
+
+
+def _of(keys: sa.Table) -> str:
+    *_, of = keys.columns
+    return of.name
+
 
 metadata = sa.MetaData()
 

@@ -50,9 +50,7 @@ class Judge:
             if not self._started:
                 self._started = True
                 await self._executor.start(lambda: None)
-            execution = self._executor.submit(
-                f"app.missions.judging:{function}", payload, time_left_s=None, on_progress=lambda _: None
-            )
+            execution = self._executor.submit(f"app.missions.judging:{function}", payload)
             try:
                 async with asyncio.timeout(_PATIENCE_S):
                     outcome = await execution.outcome()

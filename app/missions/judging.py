@@ -17,7 +17,7 @@ from app.domain.problem import UAV, Problem, Target
 from app.domain.records import problem_from_record, to_record
 from app.domain.said import said
 from app.jobs.model import WorkResult
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.missions import events
 from app.missions.changes import change
 from app.missions.draft import Draft

@@ -14,10 +14,9 @@ import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
 from app.jobs.errors import InvalidCursor
-from app.jobs.idempotency import known_by
 from app.jobs.model import Idempotency
-from app.jobs.queries import Database
 from app.jobs.stored_json import read
+from app.jobs.tables import Database, known_by
 from app.missions.errors import MissionNotFound
 from app.missions.model import Entry, Head, Mission, Planning, Proposal, ProposalStatus
 from app.missions.tables import events, idempotency_keys, missions, positions, proposals, states

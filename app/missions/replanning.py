@@ -9,7 +9,7 @@ from app.allocation import tasks
 from app.domain.plan import Plan
 from app.domain.records import problem_from_record, to_record
 from app.jobs.model import WorkResult
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.missions.effects import differences
 from app.missions.state import routes_of
 from app.simulation.evaluation import reward_of

@@ -16,9 +16,9 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import Connection, RowMapping
 
-from app.jobs.idempotency import claim_key, keep
 from app.jobs.model import Idempotency
 from app.jobs.stored_json import write
+from app.jobs.tables import claim_key, keep
 from app.missions import events as kinds
 from app.missions.errors import EventReused
 from app.missions.model import Entry, Judged, Mission, Planning, ProposalStatus, Sent

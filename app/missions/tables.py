@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 
 from app.domain.identifiers import MAX_ID_LENGTH
-from app.jobs.idempotency import key_table
+from app.jobs.tables import key_table
 
 metadata = sa.MetaData()
 

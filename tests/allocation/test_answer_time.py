@@ -8,7 +8,7 @@ import pytest
 from app.allocation.answer_time import AnswerSize, AnswerTime, expected_size
 from app.allocation.preparation import Preparations
 from app.allocation.time_limit import TimeLimit
-from app.jobs.work_context import DEADLINE, WorkContext, new_control
+from app.jobs.worker import DEADLINE, WorkContext, new_control
 from app.simulation.generator import generate
 
 RNG = np.random.default_rng(0)
@@ -163,7 +163,7 @@ class Clock:
 
     def __init__(self, monkeypatch, limit_s):
         self.now = 100.0
-        monkeypatch.setattr("app.jobs.work_context.time.monotonic", lambda: self.now)
+        monkeypatch.setattr("app.jobs.worker.time.monotonic", lambda: self.now)
         control = new_control()
         control[DEADLINE] = self.now + limit_s
         self.context = WorkContext(lambda _progress: None, control)

@@ -8,7 +8,7 @@ from app.allocation.time_limit import TimeLimit
 from app.api.openapi_examples import example_problem
 from app.api.problem_models import ProblemModel, to_problem
 from app.domain.records import problem_from_record, problem_to_record
-from app.jobs.work_context import CANCEL, WorkContext, new_control
+from app.jobs.worker import CANCEL, WorkContext, new_control
 from app.settings import Settings
 
 

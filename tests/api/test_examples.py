@@ -17,7 +17,7 @@ from app.domain.geometry import distance
 from app.domain.plan import Plan
 from app.domain.records import problem_to_record
 from app.domain.warnings import problem_warnings
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.settings import Settings
 from app.simulation.breaches import breaches_of
 

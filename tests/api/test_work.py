@@ -18,7 +18,7 @@ from app.domain.errors import InvalidCheckpoint
 from app.domain.problem import Objective, Problem
 from app.domain.records import problem_from_record, problem_to_record
 from app.jobs.model import BEST_KNOWN
-from app.jobs.work_context import CANCEL, WorkContext, new_control
+from app.jobs.worker import CANCEL, WorkContext, new_control
 from app.learning.checkpoints.checkpoint import encode
 from app.learning.pairwise.architecture import PairwiseConfig
 from app.learning.pairwise.policy import PairwisePolicy
@@ -203,7 +203,7 @@ import gc, json, sys
 from numba.core.dispatcher import Dispatcher
 from app.allocation import tasks
 from app.allocation.warm_up import warm_up
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 
 def compiled():
     found = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]

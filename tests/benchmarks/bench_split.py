@@ -22,7 +22,7 @@ sys.path[:0] = [str(Path(__file__).parents[2])]
 from app.allocation import tasks  # noqa: E402
 from app.domain.problem import UAV, Objective, Problem, Target  # noqa: E402
 from app.domain.records import problem_to_record  # noqa: E402
-from app.jobs.work_context import WorkContext  # noqa: E402
+from app.jobs.worker import WorkContext  # noqa: E402
 
 CARRIED, LEVEL = 100.0, 10_000.0
 

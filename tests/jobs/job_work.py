@@ -12,7 +12,7 @@ from typing import Any
 
 from app.domain.errors import InvalidProblem, Violation
 from app.jobs.model import Progress, WorkResult
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 
 Payload = dict[str, Any]
 

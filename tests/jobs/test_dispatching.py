@@ -40,7 +40,7 @@ def test_a_worker_is_kept_for_what_is_being_looked_for_and_what_is_told_of_meanw
                 return claim(lanes)
 
             service._store.claim = slow
-            service._dispatcher.look()
+            service._dispatcher._look()
             await eventually(looking.is_set)
             # Taken in while the look for others, which finds none, keeps the free worker.
             coming = asyncio.create_task(service.submit("until_file", gate))

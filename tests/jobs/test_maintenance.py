@@ -6,7 +6,7 @@ import time
 import sqlalchemy as sa
 from harness import database_of, eventually, make_service, url_of
 
-from app.jobs import maintenance
+from app.jobs import dispatcher
 from app.jobs.model import JobKind, Progress, WorkResult
 from app.jobs.store import JobStore
 from app.jobs.tables import jobs
@@ -62,8 +62,8 @@ def test_heartbeats_come_between_when_many_jobs_are_old(tmp_path):
 
 
 def test_a_chore_that_fails_is_tried_again_and_the_others_are_done(tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(maintenance, "_AGAIN_S", 0.01)
-    monkeypatch.setattr(maintenance, "_LOOK_INTERVAL_S", 0.01)
+    monkeypatch.setattr(dispatcher, "_AGAIN_S", 0.01)
+    monkeypatch.setattr(dispatcher, "_LOOK_INTERVAL_S", 0.01)
 
     async def scenario(service, left):
         tries = []

@@ -13,7 +13,7 @@ from sqlalchemy.exc import OperationalError
 from structlog.contextvars import bound_contextvars
 
 from app.domain.errors import InvalidCheckpoint
-from app.jobs import attempts, maintenance, queries, stored_json
+from app.jobs import attempts, dispatcher, queries, stored_json
 from app.jobs.errors import Draining, IdempotencyMismatch, JobNotFound, UnknownJobKind
 from app.jobs.model import Idempotency, JobKind, JobStatus
 from policy_store.database import Database
@@ -325,9 +325,9 @@ def test_a_result_survives_a_database_that_cannot_be_written_for_a_while(tmp_pat
 
 def test_a_result_that_could_not_be_stored_for_long_costs_an_attempt_and_not_the_job(tmp_path, monkeypatch):
     monkeypatch.setattr(attempts, "_FIRST_PAUSE_S", 0.0)
-    monkeypatch.setattr(maintenance, "_SAVE_INTERVAL_S", 0.01)
-    monkeypatch.setattr(maintenance, "_LOOK_INTERVAL_S", 0.01)
-    monkeypatch.setattr(maintenance, "_AGAIN_S", 0.01)
+    monkeypatch.setattr(dispatcher, "_SAVE_INTERVAL_S", 0.01)
+    monkeypatch.setattr(dispatcher, "_LOOK_INTERVAL_S", 0.01)
+    monkeypatch.setattr(dispatcher, "_AGAIN_S", 0.01)
 
     async def scenario():
         gate = tmp_path / "gate"

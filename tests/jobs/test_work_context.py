@@ -3,7 +3,7 @@
 import pytest
 
 from app.jobs.model import Progress
-from app.jobs.work_context import CANCEL, DEADLINE, SHARE, WorkContext, new_control
+from app.jobs.worker import CANCEL, DEADLINE, SHARE, WorkContext, new_control
 
 
 def test_a_context_shows_its_control_block():

@@ -7,7 +7,7 @@ import pytest
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.domain.surroundings import Base
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.missions import judging
 from app.missions.errors import EventRefused, ProposalClosed
 from app.missions.state import MissionState, Stop, with_routes, without_plan

@@ -10,7 +10,7 @@ from worlds import random_loading, random_sorties, random_world
 
 from app.domain.errors import IllegalPlan
 from app.domain.records import problem_to_record
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.missions import judging
 from app.missions.errors import EventRefused
 

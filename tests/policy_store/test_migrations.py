@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
-from database_probes import ROOT, scalar, start
+from database_probes import scalar, start
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
@@ -74,8 +74,6 @@ def test_threads_that_migrate_at_once_all_succeed(tmp_path: Path, files: int) ->
 def write_migrations(folder: Path, *bodies: str) -> Path:
     """Write an Alembic folder whose upgrades have the given bodies."""
     (folder / "versions").mkdir(parents=True)
-    environment = ROOT / "policy_store" / "migrations" / "env.py"
-    (folder / "env.py").write_text(environment.read_text())
     for number, body in enumerate(bodies, start=1):
         before = json.dumps(str(number - 1)) if number > 1 else "None"
         (folder / "versions" / f"{number}.py").write_text(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.domain.records import problem_to_record, to_record
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.missions import judging
 from app.missions.days.kinds import LAST_SURPRISE, Day
 from app.missions.days.truth import MOMENT, Delays, Ledger, Reports

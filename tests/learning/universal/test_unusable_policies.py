@@ -16,7 +16,7 @@ from app.api.job_kinds import TRAIN, job_kinds
 from app.domain.errors import InvalidCheckpoint, InvalidParameters, NoCompatibleSource
 from app.domain.records import problem_from_record, problem_to_record
 from app.jobs.model import WorkResult
-from app.jobs.work_context import WorkContext
+from app.jobs.worker import WorkContext
 from app.learning.checkpoints.checkpoint import encode, read_metadata, verify
 from app.learning.checkpoints.source_policies import SourcePolicies
 from app.learning.parameters import QmixParameters, TransferQmixParameters

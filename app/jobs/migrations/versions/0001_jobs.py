@@ -7,8 +7,6 @@ from alembic import op
 
 revision = "0001"
 down_revision = None
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:
@@ -48,10 +46,3 @@ def upgrade() -> None:
         sa.Column("job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), nullable=False),
     )
     op.create_index("ix_job_idempotency_keys_job_id", "job_idempotency_keys", ["job_id"])
-
-
-def downgrade() -> None:
-    """Drop the tables with everything in them."""
-    op.drop_table("job_idempotency_keys")
-    op.drop_table("job_artifacts")
-    op.drop_table("jobs")

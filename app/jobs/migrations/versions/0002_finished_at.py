@@ -6,15 +6,8 @@ from alembic import op
 
 revision = "0002"
 down_revision = "0001"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:
     """Make the index."""
     op.create_index("ix_jobs_finished_at", "jobs", ["finished_at"])
-
-
-def downgrade() -> None:
-    """Drop the index."""
-    op.drop_index("ix_jobs_finished_at", "jobs")

@@ -10,8 +10,6 @@ from alembic import op
 
 revision = "0003"
 down_revision = "0002"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:
@@ -24,8 +22,3 @@ def upgrade() -> None:
     if op.get_bind().dialect.name == "postgresql":
         op.execute("ALTER SEQUENCE jobs_number_seq AS BIGINT")
         op.alter_column("jobs", "number", type_=sa.BigInteger)
-
-
-def downgrade() -> None:
-    """Drop the table; the numbers stay wide."""
-    op.drop_table("job_owners")

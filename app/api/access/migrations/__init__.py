@@ -1,1 +1,0 @@
-"""Alembic's folder of the key table."""
