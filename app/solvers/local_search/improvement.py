@@ -56,11 +56,8 @@ _FREE_HOT, _FREE_COLD = 0.3, 0.01
 _PATIENT_MOVES_A_STOP = 2_000
 """With fewer moves for each stop of the plan that it begins from, a round begins colder."""
 
-_RELINKED_FROM = 3
-"""Rounds that there have to be time for, at least, so that plans are relinked."""
-
 _PARENTS = 6
-"""Rounds before that, at least, each of which ends with a plan."""
+"""Rounds, at least, whose plans are relinked; there has to be time for so many that begin as hot as any."""
 
 _HOT_SHARE = 0.5
 """Share of the time that goes to them."""
@@ -185,8 +182,9 @@ def improve_together(
                 _Crew(partial(_alone, search, rng), search, ends)
                 for search, rng, ends in zip(searches, generators, stops, strict=True)
             ]
-        limited = left < math.inf and not idle and not combination.on and crews[0].threads == 1
-        relinks = limited and rounds >= _RELINKED_FROM and len(first.near.active) >= LEAST_UAVS
+        alone = left < math.inf and not idle and not combination.on and crews[0].threads == 1
+        enough = _heat(_HOT_SHARE / _PARENTS * possible, int(first.routes.length.sum())) == 1.0
+        relinks = alone and enough and len(first.near.active) >= LEAST_UAVS
         hot, elite = 1.0, Elite()
         if relinks:
             hot, rounds = _HOT_SHARE, max(_PARENTS, round(_HOT_SHARE * rounds))
