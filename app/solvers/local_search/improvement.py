@@ -202,34 +202,37 @@ def improve_together(
                 tried += count
                 if not stop():
                     rounds = combination.after_round(number + 1, rounds, stop)
-                for crew in crews:
-                    elite.add(crew.search)
-                _share_best([crew.search for crew in crews])
+                _share_best(crews, elite if relinks else None)
             number += 1
             watch(1.0 if combination.proven else hot * number / rounds, number)
-        while relinks and tried < moves and not stop():
-            now = time.monotonic()
-            seconds = begin + left - now
-            # What is left at the end is not worth a round of its own.
-            seconds = _WARM_SHARE * left if seconds > 1.5 * _WARM_SHARE * left else seconds
-            span = _Span(min(moves - tried, max(1, round(_WARM_SHARE * moves))), now, now + seconds)
-            heats = [
-                _WARM if _relink(elite, crew.search, rng, cooling) else 1.0
-                for crew, rng in zip(crews, generators, strict=True)
-            ]
-            _together(threads, crews, span, cooling, heats, _silent)
-            tried += span.moves
-            for crew in crews:
-                elite.add(crew.search)
-            _share_best([crew.search for crew in crews])
-            number += 1
-            watch(min(1.0, (time.monotonic() - begin) / left), number)
+        if relinks:
+            whole = _Span(moves, begin, begin + left)
+            _relinked_rounds(threads, crews, generators, elite, cooling, whole, tried, number, watch)
     drop_idle_reloads(first)
 
 
-def _relink(elite: Elite, search: Search, rng: np.random.Generator, cooling: Cooling) -> bool:
-    """Go on from a plan between two of the best; False where they are too alike."""
-    return elite.relink(search, rng, cooling.penalty * gains(search.arrays, search.routes)[1])
+def _relinked_rounds(
+    threads: ThreadPoolExecutor, crews: Sequence[_Crew], generators: Sequence[np.random.Generator],
+    elite: Elite, cooling: Cooling, whole: _Span, tried: int, ended: int, watch: Watch,
+) -> None:  # fmt: skip
+    """Make short rounds from plans between the best, for what is left of the moves and of the time."""
+    most, longest = max(1, round(_WARM_SHARE * whole.moves)), _WARM_SHARE * (whole.end - whole.begin)
+    while tried < whole.moves and not crews[0].stop():
+        now = time.monotonic()
+        seconds = whole.end - now
+        # What is left at the end is not worth a round of its own.
+        if seconds > 1.5 * longest:
+            seconds = longest
+        span = _Span(min(whole.moves - tried, most), now, now + seconds)
+        heats = []
+        for crew, rng in zip(crews, generators, strict=True):
+            useless = cooling.penalty * gains(crew.search.arrays, crew.search.routes)[1]
+            heats.append(_WARM if elite.relink(crew.search, rng, useless) else 1.0)
+        _together(threads, crews, span, cooling, heats, _silent)
+        tried += span.moves
+        ended += 1
+        _share_best(crews, elite)
+        watch(min(1.0, whole.share(tried)), ended)
 
 
 class _Crew(NamedTuple):
@@ -326,8 +329,12 @@ def _heat(moves: float, stops: int) -> float:
     return min(1.0, math.cbrt(moves / (_PATIENT_MOVES_A_STOP * max(stops, 1))))
 
 
-def _share_best(searches: Sequence[Search]) -> None:
-    """Let every search go on from the best incumbent; of equals the first one's."""
+def _share_best(crews: Sequence[_Crew], elite: Elite | None) -> None:
+    """Note the plans of a round, and let all go on from the best incumbent; of equals the first one's."""
+    searches = [crew.search for crew in crews]
+    if elite is not None:
+        for search in searches:
+            elite.add(search)
     if len(searches) == 1:
         return
     most = max(float(search.best[0]) for search in searches)
