@@ -20,6 +20,9 @@ from app.jobs.worker import WorkContext, resolve
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import generate
 from app.solvers import protocol
+from app.solvers.greedy import greedy_plan
+from app.solvers.local_search.annealing import new_search, set_routes
+from app.solvers.local_search.relinking import Elite
 from app.solvers.registry import create_solver, parse_parameters
 from app.solvers.stop import never
 
@@ -163,6 +166,16 @@ def _sharing() -> None:
     solver.solve(large_problem(40, 80), 0, never, lambda _progress: None)
 
 
+def _relinking() -> None:
+    """Look for a plan between two, as searches under a time limit do."""
+    problem, elite = large_problem(6, 12), Elite()
+    search = new_search(compile_problem(problem))
+    elite.add(search)
+    set_routes(search, greedy_plan(problem).as_array())
+    elite.add(search)
+    elite.relink(search, np.random.default_rng(0), 0.1)
+
+
 def _evaluation() -> None:
     """Evaluate a plan of nothing, which has reasons, and one that breaks a rule."""
     problem = small_problem()
@@ -189,6 +202,7 @@ PARTS: dict[str, Callable[[], None]] = {
     "promises": _promises,
     "combining": _combining,
     "sharing": _sharing,
+    "relinking": _relinking,
     "bound": _bound,
     "geography": geography,
     "evaluation": _evaluation,

@@ -9,14 +9,14 @@ from brute_force_unloading import best_planned_reward
 from cases import problem_of
 from problems import random_problem
 from referee import replay
+from searches import Clock, assert_evaluated
 from stopping import After
 
 from app.domain.problem import UAV, Objective, Problem, Target
 from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
-from app.simulation.evaluation import reward_of, rewards_of
+from app.simulation.evaluation import reward_of
 from app.simulation.generator import generate
-from app.simulation.visit import UNLOADS_NOTHING
 from app.solvers.greedy import greedy_plan
 from app.solvers.local_search.annealing import (
     Prices,
@@ -45,27 +45,6 @@ def quiet(*_told):
 def solve(problem, *, seed=1, stop=never, report=quiet, **parameters):
     solver = LocalSearch(LocalSearchParameters(**parameters), SolverContext())
     return solver.solve(problem, seed, stop, report)
-
-
-def current_actions(search):
-    """The current plan, not the incumbent, as joint actions (S, M)."""
-    routes, home = search.routes, search.arrays.areas["level"].shape[1]
-    used = np.arange(routes.target.shape[1])[None, :] < routes.length[:, None]
-    return np.where(used, routes.target, home).T.copy()
-
-
-def assert_evaluated(search):
-    """The totals are those of the current plan; where a visit is useless, the simulator says so too."""
-    routes, arrays = search.routes, search.arrays
-    judged = rewards_of(arrays, current_actions(search)[None])
-    if routes.total[USELESS] > 0.5:
-        assert judged.rule[0] == UNLOADS_NOTHING
-        return
-    assert judged.rule[0] == 0
-    scale = 1 + abs(judged.distance[0])
-    np.testing.assert_allclose(
-        routes.total[:2], [judged.satisfaction[0], judged.distance[0]], rtol=0, atol=1e-9 * scale
-    )
 
 
 def able(rng, count, **sizes):
@@ -323,17 +302,6 @@ def test_under_a_time_limit_it_searches_on_idle_cores_too_as_long_as_they_are(mo
     assert (len(searched), asked) == (1, [])
     plain = LocalSearch(LocalSearchParameters(moves=4000), SolverContext()).solve(problem, 5, never, quiet)
     assert alone.plan == plain.plan
-
-
-class Clock:
-    """Time passes by being looked at."""
-
-    def __init__(self, step):
-        self.now, self.step = 0.0, step
-
-    def __call__(self):
-        self.now += self.step
-        return self.now
 
 
 def test_a_search_is_cold_when_its_time_is_up(monkeypatch):

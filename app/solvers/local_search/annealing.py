@@ -149,15 +149,17 @@ def actions_of(search: Search) -> Integers:
 
 
 @compiled
-def set_route(search: Search, i: int, targets: Integers) -> None:
-    """Give UAV `i` a route that rule 2 allows, whatever it unloads."""
+def set_route(search: Search, i: int, targets: Integers) -> bool:
+    """Give UAV `i` a route, whatever it unloads; False where rule 2 does not allow it."""
     arrays, routes, change = search.arrays, search.routes, search.change
     change.uav[1] = NONE
     for s in range(len(targets)):
         change.target[0, s] = targets[s]
     propose(routes, change, 0, i, 0, len(targets))
-    if feasible(arrays, change):
-        _apply_whole(arrays, routes, change)
+    if not feasible(arrays, change):
+        return False
+    _apply_whole(arrays, routes, change)
+    return True
 
 
 @compiled
@@ -183,9 +185,7 @@ def _turnover(search: Search) -> float:
 @compiled
 def _keep(search: Search, most: float) -> bool:
     """Make the current plan the incumbent if it is legal and earns more than that."""
-    routes = search.routes
-    cost = search.arrays.terms[0].weight * routes.total[DISTANCE] + routes.total[CLOSING]
-    reward = routes.total[SATISFACTION] - cost
+    routes, reward = search.routes, worth(search, 0.0)
     if routes.total[USELESS] > 0.5 or reward <= most:
         return False
     search.best[0] = reward
@@ -194,6 +194,14 @@ def _keep(search: Search, most: float) -> bool:
         for s in range(routes.length[i]):
             search.best_target[i, s] = routes.target[i, s]
     return True
+
+
+@compiled
+def worth(search: Search, useless: float) -> float:
+    """Reward of the current plan, less a price for each of its useless visits."""
+    total = search.routes.total
+    cost = search.arrays.terms[0].weight * total[DISTANCE] + total[CLOSING]
+    return float(total[SATISFACTION] - cost - useless * total[USELESS])
 
 
 @compiled

@@ -1,5 +1,8 @@
 """Rounds of annealing in pieces: as many moves as were asked for, or as time allows, on any number of cores.
 
+Under a time limit that is long enough for several rounds, half of it goes to rounds that begin hot, and the
+rest to short ones that begin warm, from plans between the best that there were.
+
 Where the stop criterion says how long it leaves, the temperature falls with the time, so that a search is
 cold when its time is up, however fast the machine is. Without a time limit it falls with the moves alone, and
 the same generators give the same plans.
@@ -29,6 +32,7 @@ from app.solvers.local_search.annealing import (
 )
 from app.solvers.local_search.combination import Combination
 from app.solvers.local_search.effort import large_moves, moves_a_second, rounds_for
+from app.solvers.local_search.relinking import LEAST_UAVS, Elite
 from app.solvers.local_search.sharing import Team, moves_at_once, pays
 from app.solvers.local_search.temperatures import coldest_by_distance, gains, neighbour_leg
 from app.solvers.protocol import StopCriterion
@@ -51,6 +55,18 @@ _FREE_HOT, _FREE_COLD = 0.3, 0.01
 
 _PATIENT_MOVES_A_STOP = 2_000
 """With fewer moves for each stop of the plan that it begins from, a round begins colder."""
+
+_PARENTS = 6
+"""Rounds, at least, whose plans are relinked; there has to be time for so many that begin as hot as any."""
+
+_HOT_SHARE = 0.5
+"""Share of the time that goes to them."""
+
+_WARM = 0.45
+"""Heat with which a round begins from a plan between two: 0 is cold, 1 hot."""
+
+_WARM_SHARE = 0.02
+"""Share of the time, and of the moves, that such a round takes."""
 
 
 class Cooling(NamedTuple):
@@ -166,28 +182,57 @@ def improve_together(
                 _Crew(partial(_alone, search, rng), search, ends)
                 for search, rng, ends in zip(searches, generators, stops, strict=True)
             ]
+        alone = left < math.inf and not idle and not combination.on and crews[0].threads == 1
+        enough = _heat(_HOT_SHARE / _PARENTS * possible, int(first.routes.length.sum())) == 1.0
+        relinks = alone and enough and len(first.near.active) >= LEAST_UAVS
+        hot, elite = 1.0, Elite()
+        if relinks:
+            hot, rounds = _HOT_SHARE, max(_PARENTS, round(_HOT_SHARE * rounds))
         while number < rounds and not combination.proven and not stop():
             now, end = time.monotonic(), np.inf
-            count = moves * (number + 1) // rounds - tried
+            count = round(hot * moves) * (number + 1) // rounds - tried
             if count > 0 and not idle:
                 if left < math.inf:
-                    end = now + (begin + left - combination.seconds - now) / (rounds - number)
-                span = _Span(count, now, end)
+                    end = now + (begin + hot * left - combination.seconds - now) / (rounds - number)
 
                 def tell(share: float, number: int = number, rounds: int = rounds) -> None:
-                    watch((number + share) / rounds, number)
+                    watch(hot * (number + share) / rounds, number)
 
-                others = [threads.submit(_round, crew, span, cooling, _silent) for crew in crews[1:]]
-                _round(crews[0], span, cooling, tell)
-                for other in others:
-                    other.result()
+                _together(threads, crews, _Span(count, now, end), cooling, [1.0] * len(crews), tell)
                 tried += count
                 if not stop():
                     rounds = combination.after_round(number + 1, rounds, stop)
-                _share_best([crew.search for crew in crews])
+                _share_best(crews, elite if relinks else None)
             number += 1
-            watch(1.0 if combination.proven else number / rounds, number)
+            watch(1.0 if combination.proven else hot * number / rounds, number)
+        if relinks:
+            whole = _Span(moves, begin, begin + left)
+            _relinked_rounds(threads, crews, generators, elite, cooling, whole, tried, number, watch)
     drop_idle_reloads(first)
+
+
+def _relinked_rounds(
+    threads: ThreadPoolExecutor, crews: Sequence[_Crew], generators: Sequence[np.random.Generator],
+    elite: Elite, cooling: Cooling, whole: _Span, tried: int, ended: int, watch: Watch,
+) -> None:  # fmt: skip
+    """Make short rounds from plans between the best, for what is left of the moves and of the time."""
+    most, longest = max(1, round(_WARM_SHARE * whole.moves)), _WARM_SHARE * (whole.end - whole.begin)
+    while tried < whole.moves and not crews[0].stop():
+        now = time.monotonic()
+        seconds = whole.end - now
+        # What is left at the end is not worth a round of its own.
+        if seconds > 1.5 * longest:
+            seconds = longest
+        span = _Span(min(whole.moves - tried, most), now, now + seconds)
+        heats = []
+        for crew, rng in zip(crews, generators, strict=True):
+            useless = cooling.penalty * gains(crew.search.arrays, crew.search.routes)[1]
+            heats.append(_WARM if elite.relink(crew.search, rng, useless) else 1.0)
+        _together(threads, crews, span, cooling, heats, _silent)
+        tried += span.moves
+        ended += 1
+        _share_best(crews, elite)
+        watch(min(1.0, whole.share(tried)), ended)
 
 
 class _Crew(NamedTuple):
@@ -219,8 +264,22 @@ def _alone(
     anneal(search, rng, moves, hot, cold, prices, collecting, large)
 
 
-def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], None]) -> None:
-    """One round of one plan, which is legal at its end."""
+def _together(
+    threads: ThreadPoolExecutor, crews: Sequence[_Crew], span: _Span, cooling: Cooling,
+    heats: Sequence[float], tell: Callable[[float], None],
+) -> None:  # fmt: skip
+    """One round of each plan; the first one's tells how far it is."""
+    others = [
+        threads.submit(_round, crew, span, cooling, heat, _silent)
+        for crew, heat in zip(crews[1:], heats[1:], strict=True)
+    ]
+    _round(crews[0], span, cooling, heats[0], tell)
+    for other in others:
+        other.result()
+
+
+def _round(crew: _Crew, span: _Span, cooling: Cooling, heat: float, tell: Callable[[float], None]) -> None:
+    """One round of one plan, which is legal at its end; with heat 0 it begins cold, with 1 hot."""
     search = crew.search
     largest, scale = gains(search.arrays, search.routes)
     leg = neighbour_leg(search.arrays, search.near)
@@ -243,7 +302,8 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], N
     large, cost = large_moves(search.routes.length)
     while done < span.moves and share < 1.0 and not crew.stop():
         count = min(piece, span.moves - done)
-        begin = cooling.hot if span.end == np.inf else _begin(cooling, crew.threads * expected, stops)
+        warmth = heat if span.end == np.inf else heat * _heat(crew.threads * expected, stops)
+        begin = cooling.cold * (cooling.hot / cooling.cold) ** warmth
         ratio = coldest / (begin * largest)
         hot, cold = (begin * ratio**part * largest for part in (share, min(share + step, 1.0)))
         collecting = share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav)
@@ -261,17 +321,20 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, tell: Callable[[float], N
     drop_useless(search)
 
 
-def _begin(cooling: Cooling, moves: float, stops: int) -> float:
-    """Return the temperature that a round begins with: colder where it has few moves for each stop.
+def _heat(moves: float, stops: int) -> float:
+    """Return how hot a round begins, from 0 to 1: colder where it has few moves for each stop.
 
     Heat that there is no time to undo only costs (``tests/benchmarks/LOG.md``).
     """
-    heat = min(1.0, math.cbrt(moves / (_PATIENT_MOVES_A_STOP * max(stops, 1))))
-    return cooling.cold * (cooling.hot / cooling.cold) ** heat
+    return min(1.0, math.cbrt(moves / (_PATIENT_MOVES_A_STOP * max(stops, 1))))
 
 
-def _share_best(searches: Sequence[Search]) -> None:
-    """Let every search go on from the best incumbent; of equals the first one's."""
+def _share_best(crews: Sequence[_Crew], elite: Elite | None) -> None:
+    """Note the plans of a round, and let all go on from the best incumbent; of equals the first one's."""
+    searches = [crew.search for crew in crews]
+    if elite is not None:
+        for search in searches:
+            elite.add(search)
     if len(searches) == 1:
         return
     most = max(float(search.best[0]) for search in searches)

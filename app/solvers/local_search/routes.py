@@ -83,6 +83,12 @@ class Routes(NamedTuple):
     total: Floats
 
 
+def copy_routes(routes: Routes, into: Routes) -> None:
+    """Make one plan's routes another's, of the same problem."""
+    for ours, theirs in zip(routes, into, strict=True):
+        np.copyto(theirs, ours)
+
+
 def empty_routes(arrays: ProblemArrays) -> Routes:
     """Make the plan in which nobody flies, for the first problem of a stack."""
     m, _, k = arrays.shape

@@ -17,16 +17,9 @@ import numpy as np
 
 from app.simulation.arrays import NONE, Flags, Integers, ProblemArrays
 from app.simulation.decorators import compiled
-from app.solvers.local_search.annealing import Prices, Search, anneal, keep_best, set_route
+from app.solvers.local_search.annealing import Prices, Search, anneal, keep_best, set_route, worth
 from app.solvers.local_search.neighbourhood import Neighbourhood, draw, nearest
-from app.solvers.local_search.routes import (
-    CLOSING,
-    DISTANCE,
-    SATISFACTION,
-    USELESS,
-    Routes,
-    empty_routes,
-)
+from app.solvers.local_search.routes import Routes, copy_routes, empty_routes
 from app.solvers.protocol import StopCriterion
 
 _NEIGHBOURS = 8
@@ -121,7 +114,7 @@ class Team:
             )
             if is_there
         ]
-        before = _Before(first.routes.target.copy(), first.routes.length.copy(), _value(first, prices))
+        before = _Before(first.routes.target.copy(), first.routes.length.copy(), worth(first, prices.useless))
         for search, _, _ in crew[1:]:
             _follow(search, first)
 
@@ -142,22 +135,22 @@ class Team:
 
     def _put_together(self, searches: list[Search], before: _Before, prices: Prices) -> None:
         """Give the first search the plan and the incumbent that all have found."""
-        first, gains = searches[0], [_value(search, prices) - before.value for search in searches]
+        first, gains = searches[0], [worth(search, prices.useless) - before.value for search in searches]
         leading = int(np.argmax(gains))
         ours = searches[leading]
         for number, (search, gain) in enumerate(zip(searches, gains, strict=True)):
             if number == leading:
                 continue
-            _copy(ours.routes, self._spare)
-            expected = _value(ours, prices) + gain
+            copy_routes(ours.routes, self._spare)
+            expected = worth(ours, prices.useless) + gain
             for i in map(int, np.flatnonzero(search.near.own & before.differs_from(search.routes))):
                 set_route(ours, i, search.routes.target[i, : search.routes.length[i]])
             # More is lost where the two meet than the change was about.
-            if expected - _value(ours, prices) > abs(gain):
-                _copy(self._spare, ours.routes)
+            if expected - worth(ours, prices.useless) > abs(gain):
+                copy_routes(self._spare, ours.routes)
         keep_best(ours)
         if leading:
-            _copy(ours.routes, first.routes)
+            copy_routes(ours.routes, first.routes)
         best = max(searches, key=lambda search: float(search.best[0]))
         if best.best[0] > first.best[0]:
             np.copyto(first.best, best.best)
@@ -348,17 +341,5 @@ def _keep_own(lists: Integers, others: Integers, rows: Integers, part_of: Intege
 
 def _follow(search: Search, first: Search) -> None:
     """Give a search the plan of the first one, and the reward that its incumbent has to exceed."""
-    _copy(first.routes, search.routes)
+    copy_routes(first.routes, search.routes)
     np.copyto(search.best, first.best)
-
-
-def _copy(routes: Routes, into: Routes) -> None:
-    for ours, theirs in zip(routes, into, strict=True):
-        np.copyto(theirs, ours)
-
-
-def _value(search: Search, prices: Prices) -> float:
-    """Reward of the current plan, less what its useless visits cost."""
-    total = search.routes.total
-    costs = float(search.arrays.terms["weight"][0]) * total[DISTANCE] + total[CLOSING]
-    return float(total[SATISFACTION] - costs - prices.useless * total[USELESS])
