@@ -13,8 +13,7 @@ from app.domain.records import problem_to_record
 from app.simulation.arrays import compile_problem
 from app.simulation.generator import FAMILIES, generate
 from app.simulation.world_generator import WORLD_FAMILIES
-from app.solvers.local_search import sharing
-from app.solvers.local_search.annealing import Prices, actions_of, drop_useless, new_search, replica
+from app.solvers.local_search.annealing import Prices, actions_of, drop_useless, new_search, replica, worth
 from app.solvers.local_search.sharing import Team, pays, share_out
 from app.solvers.local_search.solver import LocalSearch
 from app.solvers.parameters import LocalSearchParameters
@@ -105,13 +104,13 @@ def test_a_change_in_which_more_is_lost_than_found_is_taken_back():
     searches = [search, replica(search)]
     with ThreadPoolExecutor(1) as threads:
         team = Team(searches, [np.random.default_rng(n) for n in (1, 2)], [never] * 2, threads)
-        worth = float(search.best[0])
+        before = float(search.best[0])
         for _ in range(20):
             # Cold: no part gets worse by itself, and so the plan does not.
             team.anneal(3000, 3000, 1e-9, 1e-9, Prices(1.0), False, 0.1)
-            now = sharing._value(search, Prices(1.0))
-            assert now >= worth - 1e-9
-            worth = now
+            now = worth(search, 1.0)
+            assert now >= before - 1e-9
+            before = now
 
 
 def test_a_shared_search_is_the_same_again_and_better_than_a_thread_alone():
