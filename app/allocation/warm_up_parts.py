@@ -173,7 +173,7 @@ def _relinking() -> None:
     elite.add(search)
     set_routes(search, greedy_plan(problem).as_array())
     elite.add(search)
-    elite.relink(search, np.random.default_rng(0), 0.1)
+    elite.relink(search, np.random.default_rng(0), 0.1, never)
 
 
 def _evaluation() -> None:

@@ -23,7 +23,7 @@ from app.solvers.local_search.annealing import (
 from app.solvers.local_search.improvement import _PARENTS, Cooling, improve
 from app.solvers.local_search.relinking import LEAST_UAVS, Elite
 from app.solvers.local_search.routes import USELESS
-from app.solvers.stop import Deadline
+from app.solvers.stop import Deadline, never
 
 USELESS_COSTS = 0.05
 
@@ -69,7 +69,7 @@ def test_a_plan_between_two_has_the_routes_of_both():
         plans = routes_of(one), routes_of(other)
         search = replica(one)
         before = float(search.best[0])
-        relinked = elite.relink(search, np.random.default_rng(number), USELESS_COSTS)
+        relinked = elite.relink(search, np.random.default_rng(number), USELESS_COSTS, never)
         now = routes_of(search)
         assert_evaluated(search)
         assert search.best[0] >= before
@@ -86,12 +86,31 @@ def test_a_plan_between_two_has_the_routes_of_both():
 def test_of_one_plan_alone_nothing_lies_between():
     (one, _), *_ = pairs(1)
     elite = Elite()
-    assert not elite.relink(one, np.random.default_rng(0), USELESS_COSTS)
+    assert not elite.relink(one, np.random.default_rng(0), USELESS_COSTS, never)
     elite.add(one)
     elite.add(one)
     search = replica(one)
-    assert not elite.relink(search, np.random.default_rng(0), USELESS_COSTS)
+    assert not elite.relink(search, np.random.default_rng(0), USELESS_COSTS, never)
     assert routes_of(search) == routes_of(one)
+
+
+def test_a_way_that_is_stopped_ends_at_one_of_the_two_plans():
+    problem = generate("uniform", 60, 120, 2, np.random.default_rng(6))
+    search = new_search(compile_problem(problem))
+    set_routes(search, greedy_plan(problem).as_array())
+    plans = [annealed(search, seed, moves=20_000) for seed in (1, 2)]
+    elite, asked = Elite(), []
+    for plan in plans:
+        elite.add(plan)
+
+    def stop():
+        asked.append(True)
+        return len(asked) > 1
+
+    assert not elite.relink(search, np.random.default_rng(1), USELESS_COSTS, stop)
+    assert len(asked) == 2
+    assert routes_of(search) in [routes_of(plan) for plan in plans]
+    assert elite.relink(search, np.random.default_rng(1), USELESS_COSTS, never)
 
 
 def test_the_best_plans_are_kept_and_none_twice():

@@ -227,7 +227,7 @@ def _relinked_rounds(
         heats = []
         for crew, rng in zip(crews, generators, strict=True):
             useless = cooling.penalty * gains(crew.search.arrays, crew.search.routes)[1]
-            heats.append(_WARM if elite.relink(crew.search, rng, useless) else 1.0)
+            heats.append(_WARM if elite.relink(crew.search, rng, useless, crews[0].stop) else 1.0)
         _together(threads, crews, span, cooling, heats, _silent)
         tried += span.moves
         ended += 1
@@ -303,7 +303,7 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, heat: float, tell: Callab
     while done < span.moves and share < 1.0 and not crew.stop():
         count = min(piece, span.moves - done)
         warmth = heat if span.end == np.inf else heat * _heat(crew.threads * expected, stops)
-        begin = cooling.cold * (cooling.hot / cooling.cold) ** warmth
+        begin = cooling.hot * (cooling.cold / cooling.hot) ** (1.0 - warmth)
         ratio = coldest / (begin * largest)
         hot, cold = (begin * ratio**part * largest for part in (share, min(share + step, 1.0)))
         collecting = share >= _COLLECTED_FROM and search.pool.size[0] < len(search.pool.uav)

@@ -9,23 +9,54 @@ approach for the team orienteering problem", Computers & Operations Research 201
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import NamedTuple
 
 import numpy as np
 
-from app.simulation.arrays import NONE, Flags, Integers
+from app.simulation.arrays import NONE, Flags, Floats, Integers
 from app.simulation.decorators import compiled
 from app.solvers.local_search.annealing import ROUNDING, Search, keep_best, set_route, worth
 from app.solvers.local_search.change import undo
 from app.solvers.local_search.routes import Routes, copy_routes
+from app.solvers.protocol import StopCriterion
 
 _ROOM = 8
 """Plans at most that are kept."""
+
+_AT_ONCE = 500
+"""Plans that are looked at on the way between two looks at the stop criterion; some milliseconds."""
 
 _APART = 2
 """Routes at least in which a plan between two differs from each."""
 
 LEAST_UAVS = 2 * _APART + 2
 """UAVs from which on plans are relinked: of fewer there is little between two."""
+
+
+class _Way(NamedTuple):
+    """How far the way to another plan is made.
+
+    Attributes
+    ----------
+    target, length
+        (M, S) and (M,) the other plan's routes.
+    missing
+        (M,) UAVs that have another route than there.
+    order
+        (M,) UAVs in the order in which they got theirs.
+    made, best
+        (1,) how many have got theirs, and after how many the plan was worth most, 0 where that is nowhere.
+    most
+        (1,) how much it was worth.
+    """
+
+    target: Integers
+    length: Integers
+    missing: Flags
+    order: Integers
+    made: Integers
+    best: Integers
+    most: Floats
 
 
 class Elite:
@@ -46,7 +77,7 @@ class Elite:
             del self._plans[lowest]
         self._plans.append((reward, deepcopy(search.routes)))
 
-    def relink(self, search: Search, rng: np.random.Generator, useless: float) -> bool:
+    def relink(self, search: Search, rng: np.random.Generator, useless: float, stop: StopCriterion) -> bool:
         """Make the best plan between two of them the current one; one of them where they are too alike.
 
         Parameters
@@ -57,6 +88,8 @@ class Elite:
             Chooses the two.
         useless
             What a useless visit costs.
+        stop
+            Asked every few milliseconds; where it says so, the current plan is one of the two.
 
         Returns
         -------
@@ -68,67 +101,64 @@ class Elite:
         chosen = rng.choice(len(self._plans), min(2, len(self._plans)), replace=False)
         start, goal = self._plans[chosen[0]][1], self._plans[chosen[-1]][1]
         copy_routes(start, search.routes)
-        order = np.zeros(len(start.length), np.int64)
-        best = _walk(search, goal.target, goal.length, useless, order, np.zeros(len(order), np.bool_))
+        way = _way_to(search.routes, goal)
+        while not _walk(search, way, useless):
+            if stop():
+                way.best[0] = 0
+                break
         copy_routes(start, search.routes)
-        for i in map(int, order[:best]):
+        for i in map(int, way.order[: way.best[0]]):
             set_route(search, i, goal.target[i, : goal.length[i]])
-        return best > 0
+        return bool(way.best[0] > 0)
+
+
+def _way_to(routes: Routes, goal: Routes) -> _Way:
+    """Return the way from one plan to another, of which nothing is made."""
+    flown = np.arange(goal.target.shape[1]) < goal.length[:, None]
+    other = ((routes.target != goal.target) & flown).any(axis=1)
+    return _Way(
+        target=goal.target,
+        length=goal.length,
+        missing=other | (routes.length != goal.length),
+        order=np.zeros(len(goal.length), np.int64),
+        made=np.zeros(1, np.int64),
+        best=np.zeros(1, np.int64),
+        most=np.full(1, -np.inf),
+    )
 
 
 @compiled
-def _walk(
-    search: Search, target: Integers, length: Integers, useless: float, order: Integers, missing: Flags
-) -> int:
-    """Give the UAVs the routes of another plan, one by one.
+def _walk(search: Search, way: _Way, useless: float) -> bool:
+    """Give some UAVs the routes of the other plan, one by one; True once nobody is left who can have one.
 
     Parameters
     ----------
     search
-        Changed: its current plan becomes the other one, and its incumbent where a better one is on the way.
-    target, length
-        (M, S) and (M,) the other plan's routes.
+        Changed: its current plan, and its incumbent where a better one is on the way.
+    way
+        Changed. Its best plan is not nearer to either plan than ``_APART``.
     useless
         What a useless visit costs.
-    order
-        (M,) receives the UAVs in the order in which they got their routes.
-    missing
-        (M,) scratch space, all False.
-
-    Returns
-    -------
-    int
-        After how many of them the plan was worth most, not nearer to either than ``_APART``; 0 where none is.
     """
-    routes, differing = search.routes, 0
-    for i in range(len(length)):
-        if not _has_route(routes, i, target, length):
-            missing[i] = True
-            differing += 1
-    most, best = -np.inf, 0
-    for made in range(1, differing + 1):
-        after, chosen = -np.inf, NONE
-        for i in range(len(length)):
-            if missing[i] and set_route(search, i, target[i, : length[i]]):
+    looks = 0
+    while looks < _AT_ONCE:
+        after, chosen, left = -np.inf, NONE, 0
+        for i in range(len(way.missing)):
+            if not way.missing[i]:
+                continue
+            left += 1
+            if set_route(search, i, way.target[i, : way.length[i]]):
                 value = worth(search, useless)
-                undo(search.arrays, routes, search.change)
+                undo(search.arrays, search.routes, search.change)
                 if value > after:
                     after, chosen = value, i
         if chosen == NONE:
-            break
-        set_route(search, chosen, target[chosen, : length[chosen]])
-        missing[chosen], order[made - 1] = False, chosen
+            return True
+        looks += left
+        set_route(search, chosen, way.target[chosen, : way.length[chosen]])
+        way.missing[chosen], way.order[way.made[0]] = False, chosen
+        way.made[0] += 1
         keep_best(search)
-        if after > most and _APART <= made <= differing - _APART:
-            most, best = after, made
-    return best
-
-
-@compiled
-def _has_route(routes: Routes, i: int, target: Integers, length: Integers) -> bool:
-    """Whether a UAV has the same route in the current plan as in another one."""
-    same, s = routes.length[i] == length[i], 0
-    while same and s < length[i]:
-        same = routes.target[i, s] == target[i, s]
-        s += 1
-    return bool(same)
+        if after > way.most[0] and way.made[0] >= _APART and left - 1 >= _APART:
+            way.most[0], way.best[0] = after, way.made[0]
+    return False
