@@ -1,6 +1,7 @@
 """Jobs whose time limit ends while all workers are busy: answered beside them, once, whatever dies."""
 
 import asyncio
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,10 @@ HASTY = (
     JobKind("stubborn", "job_work:deaf", "interactive", at_once="job_work:echo"),
     JobKind("fragile", "job_work:until_file", "interactive", at_once="job_work:die"),
 )
+
+
+# Long enough for an answer at once on a machine that is busy with other tests.
+GRACE_S = 0.5
 
 
 def paced(seconds, effort=1.0, times=5):
@@ -69,8 +74,13 @@ def test_those_whose_turn_comes_meanwhile_are_answered_together_and_no_others():
     assert len(due({"a": Wait(100.0, 64.0), "b": Wait(100.0, 64.0)}, pace, 99.0)) == 1
 
 
-def busy(tmp_path, **settings):
-    return running(tmp_path, kinds=HASTY, reserve=LocalExecutor(1), **settings)
+@asynccontextmanager
+async def busy(tmp_path, **settings):
+    """Run a service whose worker and reserve are both warm: a cold reserve leaves what is due to workers."""
+    reserve = LocalExecutor(1)
+    async with running(tmp_path, kinds=HASTY, reserve=reserve, **settings) as service:
+        await eventually(lambda: reserve.ready == 1)
+        yield service
 
 
 def gate(tmp_path) -> dict[str, str]:
@@ -149,7 +159,7 @@ def test_one_whose_process_dies_is_tried_again_and_fails_after_three(tmp_path):
 
 def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_path):
     async def scenario():
-        async with busy(tmp_path, overrun_grace_s=0.1) as service:
+        async with busy(tmp_path, overrun_grace_s=GRACE_S) as service:
             job, _ = await service.submit("stubborn", {}, time_limit_s=0.2)
             done = await finished(service, job)
             assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 2)
@@ -163,13 +173,13 @@ def test_work_that_does_not_end_with_its_time_is_ended_and_the_job_answered(tmp_
 
 def test_work_that_is_held_by_what_ends_by_itself_is_given_the_time(tmp_path):
     async def scenario():
-        async with busy(tmp_path, overrun_grace_s=0.1) as service:
-            job, _ = await service.submit("held", {"seconds": 0.8}, time_limit_s=0.1)
+        async with busy(tmp_path, overrun_grace_s=GRACE_S) as service:
+            job, _ = await service.submit("held", {"seconds": 1.0}, time_limit_s=0.1)
             done = await finished(service, job)
             assert (done.status, done.attempt) == (JobStatus.SUCCEEDED, 1)
             assert service.load().restarts == 0
             # Held no more, it is ended as any other.
-            job, _ = await service.submit("held", {"seconds": 0.3, "then_deaf": True}, time_limit_s=0.1)
+            job, _ = await service.submit("held", {"seconds": 0.8, "then_deaf": True}, time_limit_s=0.1)
             assert (await finished(service, job)).attempt == 2
             await eventually(lambda: service.load().restarts == 1)
 
@@ -182,7 +192,7 @@ def test_those_behind_one_whose_process_dies_wait_for_whatever_is_free_first(tmp
 
     async def scenario():
         warm.touch()
-        async with running(tmp_path, kinds=HASTY, reserve=reserve, overrun_grace_s=0.1) as service:
+        async with running(tmp_path, kinds=HASTY, reserve=reserve, overrun_grace_s=GRACE_S) as service:
             await eventually(lambda: reserve.ready == 1)
             await service.submit("until_file", gate(tmp_path))
             # The process that replaces the first one does not become warm before the end.
