@@ -14,11 +14,14 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).parents[2])]
+sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
+
+from library_on_trial import library_of, policies_for_every_size  # noqa: E402
 
 from app.domain.problem import Problem  # noqa: E402
 from app.simulation.drawn_generator import drawn, drawn_size  # noqa: E402
@@ -46,27 +49,31 @@ def problem(number: int) -> Problem:
     return drawn(*drawn_size(rng), rng)
 
 
-def answer(number: int, algorithm: str, seconds: float, without: str | None) -> float:
+def answer(number: int, algorithm: str, seconds: float, without: str | None, url: str) -> float:
     """Return what an algorithm's plan earns that has some processor seconds."""
     import time  # noqa: PLC0415 - replaced in this process alone
 
     time.monotonic = time.process_time
     if without:
         PARTS[without]()
-    solver = create_solver(algorithm, parse_parameters(algorithm, {}), SolverContext())
+    solver = create_solver(algorithm, parse_parameters(algorithm, {}), SolverContext(url))
     asked = problem(number)
     return reward_of(
         asked, solver.solve(asked, 1, Deadline(seconds, time.process_time), lambda _told: None).plan
     )
 
 
-def rewards(numbers: range, algorithm: str, seconds: float, without: str | None = None) -> Iterator[float]:
-    """Yield what an algorithm earns on each problem, two at a time."""
-    with ProcessPoolExecutor(os.cpu_count()) as processes:
+def rewards(
+    numbers: range, url: str, algorithm: str, seconds: float, without: str | None = None
+) -> Iterator[float]:
+    """Yield what an algorithm earns on each problem, one a core at a time."""
+    cores = os.cpu_count() or 1
+    with ProcessPoolExecutor(cores) as processes:
         # What is compiled or loaded at a first call is not the search's.
-        list(processes.map(answer, [0] * 4, [algorithm] * 4, [0.2] * 4, [without] * 4))
-        count = len(numbers)
-        yield from processes.map(answer, numbers, [algorithm] * count, [seconds] * count, [without] * count)
+        first = partial(answer, algorithm=algorithm, seconds=0.2, without=without, url=url)
+        list(processes.map(first, [0] * 2 * cores))
+        work = partial(answer, algorithm=algorithm, seconds=seconds, without=without, url=url)
+        yield from processes.map(work, numbers)
 
 
 def main() -> None:
@@ -80,19 +87,24 @@ def main() -> None:
     options.add_argument("--without", action="append", default=[], choices=PARTS)
     given = options.parse_args()
     numbers = range(given.first, given.first + given.problems)
-    found = {"auto": np.array(list(rewards(numbers, "auto", given.seconds)))}
-    for algorithm in given.beside:
-        found[algorithm] = np.array(list(rewards(numbers, algorithm, given.seconds)))
-    for part in given.without:
-        found[f"without {part}"] = np.array(list(rewards(numbers, "auto", given.seconds, part)))
-    best = np.max(list(found.values()), axis=0)
+    asked = {name: (name, given.seconds, None) for name in ("auto", *given.beside)}
+    asked |= {f"without {part}": ("auto", given.seconds, part) for part in given.without}
     if given.reference:
-        best = np.maximum(best, list(rewards(numbers, "auto", given.reference)))
-    print(f"{'':<24}{'mean':>8}{'1 %':>8}{'worst':>8}{'ahead of auto':>15}")
-    for name, earned in found.items():
-        ratio = np.divide(earned, best, out=np.ones_like(best), where=best > 0)
-        ahead = int((earned > found["auto"] * (1 + 1e-9)).sum())
-        print(f"{name:<24}{ratio.mean():>8.4f}{np.quantile(ratio, 0.01):>8.4f}{ratio.min():>8.4f}{ahead:>15}")
+        asked[f"auto, {given.reference:g} s"] = ("auto", given.reference, None)
+    with library_of(policies_for_every_size(None)) as url:
+        found = {name: np.array(list(rewards(numbers, url, *work))) for name, work in asked.items()}
+    best = np.max(list(found.values()), axis=0)
+    print(f"{'':<24}{'mean':>8}{'1 %':>8}{'worst':>8}{'ahead of auto':>15}{'by at most':>12}")
+    ratios = {
+        name: np.divide(earned, best, out=np.ones_like(best), where=best > 0)
+        for name, earned in found.items()
+    }
+    for name, ratio in ratios.items():
+        lead = ratio - ratios["auto"]
+        print(
+            f"{name:<24}{ratio.mean():>8.4f}{np.quantile(ratio, 0.01):>8.4f}{ratio.min():>8.4f}"
+            f"{int((lead > 1e-9).sum()):>15}{max(0.0, lead.max()):>12.4f}"
+        )
 
 
 if __name__ == "__main__":

@@ -23,6 +23,11 @@ _CHOOSING_WORK = 8e6
 _POLICIES = 3
 _ORDERS = 12
 
+_LITTLE_WORK = 5e5
+"""Work up to which there are more roll-outs than that, some milliseconds; `_MOST_ORDERS` at most."""
+
+_MOST_ORDERS = 48
+
 _SAMPLING_WORK = 6e6
 """Work of all sampled roll-outs together; about a third of a second."""
 
@@ -71,7 +76,8 @@ class Effort:
 def effort(arrays: ProblemArrays) -> Effort:
     """Return what a problem is given by default."""
     work = roll_out_work(arrays)
-    orders = int(np.clip(_CHOOSING_WORK / work, 1, _ORDERS))
+    most_orders = np.clip(_LITTLE_WORK / work, _ORDERS, _MOST_ORDERS)
+    orders = int(np.clip(_CHOOSING_WORK / work, 1, most_orders))
     return Effort(
         policy=work <= _MOST_WORK,
         policies=int(np.clip(_CHOOSING_WORK / (orders * work), 1, _POLICIES)),
