@@ -96,8 +96,9 @@ def nearest(problem):
 
 @pytest.fixture
 def one_order(monkeypatch):
-    """UAVs act in the order of their indices only."""
-    monkeypatch.setattr("app.learning.universal.episodes.effort._ORDERS", 1)
+    """Each policy is rolled out once."""
+    for most in ("_ORDERS", "_MOST_ORDERS"):
+        monkeypatch.setattr(f"app.learning.universal.episodes.effort.{most}", 1)
 
 
 @pytest.mark.parametrize(("tried", "given"), [(2, {}), (3, {"samples": 1})])
