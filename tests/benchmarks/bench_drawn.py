@@ -23,6 +23,7 @@ sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 
 from library_on_trial import library_of, policies_for_every_size  # noqa: E402
 
+from app.allocation.warm_up import load_all  # noqa: E402
 from app.domain.problem import Problem  # noqa: E402
 from app.simulation.drawn_generator import drawn, drawn_size  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
@@ -68,7 +69,7 @@ def rewards(
 ) -> Iterator[float]:
     """Yield what an algorithm earns on each problem, one a core at a time."""
     cores = os.cpu_count() or 1
-    with ProcessPoolExecutor(cores) as processes:
+    with ProcessPoolExecutor(cores, initializer=load_all) as processes:
         # What is compiled or loaded at a first call is not the search's.
         first = partial(answer, algorithm=algorithm, seconds=0.2, without=without, url=url)
         list(processes.map(first, [0] * 2 * cores))

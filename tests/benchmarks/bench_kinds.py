@@ -23,6 +23,7 @@ sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 from library_on_trial import library_of, policies_for_every_size  # noqa: E402
 from problem_kinds import HARD_KINDS  # noqa: E402
 
+from app.allocation.warm_up import load_all  # noqa: E402
 from app.domain.problem import Problem  # noqa: E402
 from app.simulation.evaluation import reward_of  # noqa: E402
 from app.solvers.protocol import SolverContext  # noqa: E402
@@ -82,7 +83,10 @@ def main() -> None:
     options.add_argument("--kinds", nargs="+", default=list(HARD_KINDS), choices=list(HARD_KINDS))
     options.add_argument("--workers", type=int, default=os.cpu_count())
     given = options.parse_args()
-    with library_of(policies_for_every_size(None)) as url, ProcessPoolExecutor(given.workers) as pool:
+    with (
+        library_of(policies_for_every_size(None)) as url,
+        ProcessPoolExecutor(given.workers, initializer=load_all) as pool,
+    ):
         # What is compiled or loaded at a first call is not the search's.
         for algorithm in ("auto", *given.beside):
             first = [
