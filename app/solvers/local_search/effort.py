@@ -35,6 +35,10 @@ _LARGE_COST, _LARGE_COST_A_STOP = 3.0, 0.6
 _SPEED = 6e6
 """Moves a second times what one costs, on a core of 2024."""
 
+_SPEED_STOPS, _SLOWDOWN = 100, 0.25
+"""Stops of a plan from which moves become slower, as what they look at leaves the processor's cache, and with
+which power of the stops."""
+
 _PATIENCE = 25
 """Times the default moves that a search goes on where a time limit allows it."""
 
@@ -57,9 +61,10 @@ def large_moves(lengths: Integers) -> tuple[float, float]:
     return probability, 1.0 + probability * (cost - 1.0)
 
 
-def moves_a_second(arrays: ProblemArrays) -> float:
-    """Return about how many moves a second are tried on one core; no schedule relies on it."""
-    return _SPEED / move_cost(arrays)
+def moves_a_second(arrays: ProblemArrays, lengths: Integers) -> float:
+    """Return about how many moves a second are tried on one core, with routes (M,) so long."""
+    slowdown = max(1.0, int(lengths.sum()) / _SPEED_STOPS) ** _SLOWDOWN
+    return _SPEED / move_cost(arrays) / slowdown
 
 
 def moves_within_limit(arrays: ProblemArrays) -> int:

@@ -166,7 +166,7 @@ def improve_together(
     begin, left = time.monotonic(), stop.seconds_left()
     possible = float(moves)
     if left < math.inf:
-        possible = min(possible, left * moves_a_second(searches[0].arrays))
+        possible = min(possible, left * moves_a_second(searches[0].arrays, searches[0].routes.length))
         rounds = rounds_for(rounds, possible / max(moves, 1))
     combination = Combination(searches, rounds, left)
     searches = combination.searches
@@ -290,7 +290,7 @@ def _round(crew: _Crew, span: _Span, cooling: Cooling, heat: float, tell: Callab
         haste, thrift = _guides(search, cooling.guide * scale, cooling.far * scale, leg)
         coldest = cooling.cold * scale
     prices = Prices(cooling.penalty * scale, haste, thrift)
-    a_second = moves_a_second(search.arrays)
+    a_second = moves_a_second(search.arrays, search.routes.length)
     at_once = max(100, round(_PIECE_S * a_second))
     done, share, told = 0, span.share(0), 0.0
     stops, expected = int(search.routes.length.sum()), float(span.moves)
