@@ -129,7 +129,7 @@ def _way_to(routes: Routes, goal: Routes) -> _Way:
 
 @compiled
 def _walk(search: Search, way: _Way, useless: float) -> bool:
-    """Give some UAVs the routes of the other plan, one by one; True once nobody is left who can have one.
+    """Give some UAVs the routes of the other plan, one by one; True once no further UAV can have one.
 
     Parameters
     ----------
